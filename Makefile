@@ -1,0 +1,71 @@
+# The study and its tests. Every target first makes .venv from environment.lock where it is missing
+# or stale; PYTHON=... says with which Python.
+
+SHELL := /bin/bash
+CORES ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
+WITH ?=
+
+export PATH := $(CURDIR)/.venv/bin:$(PATH)
+SNAKEMAKE = snakemake --cores $(CORES)
+OVERLAY = $(if $(WITH),--configfile $(WITH))
+QUICK = --configfile config/quick.yaml
+
+.DEFAULT_GOAL := help
+.PHONY: help study quick test bench check check-workflow format lock why clean environment FORCE
+
+help: ## List the targets
+	@echo "make study                  the whole study"
+	@echo "make figures/fig5.pdf       one figure (figures/quick/fig5.pdf: in draft form)"
+	@echo "make study WITH=FILE        another answer: FILE of config/what_if, or your own settings"
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | grep -v '^study' | \
+	    awk -F':.*## ' '{ printf "make %-22s %s\n", $$1, $$2 }'
+
+study: environment ## The whole study
+	$(SNAKEMAKE) $(OVERLAY)
+
+quick: environment ## Every figure in draft form, in a minute
+	$(SNAKEMAKE) $(QUICK)
+
+figures/quick/% results/quick/%: environment FORCE
+	$(SNAKEMAKE) $(QUICK) $@
+
+figures/% results/%: environment FORCE
+	$(SNAKEMAKE) $(OVERLAY) $@
+
+why: environment ## What would run, and why (TARGET=figures/fig5.pdf: for one file)
+	@$(SNAKEMAKE) $(OVERLAY) --dry-run $(TARGET)
+
+test: environment ## All tests
+	pytest -n 2
+
+bench: environment ## Compare speed and memory with other detectors
+	python -m benchmarks
+
+check: environment check-workflow ## Formatters, linters, types, the workflow
+	ruff format --check
+	ruff check
+	mypy
+	snakefmt --check Snakefile workflow
+	codespell
+
+check-workflow: environment
+	python tools/lint_workflow.py
+	snakemake --dry-run --quiet
+
+format: environment ## Format all code and rules
+	ruff check --fix
+	ruff format
+	snakefmt Snakefile workflow
+
+lock: ## Renew environment.lock (needs uv)
+	uv pip compile --universal --fork-strategy fewest --generate-hashes --python-version 3.11 \
+	    --all-extras pyproject.toml -o environment.lock --no-header
+
+clean: ## Delete all results, figures and logs
+	rm -rf figures logs
+	find results -mindepth 1 -maxdepth 1 ! -name reference -exec rm -rf {} + 2>/dev/null || true
+
+environment:
+	@tools/environment
+
+FORCE:

@@ -1,0 +1,270 @@
+"""The command `keystab`: simulate a view, detect keypoints, look into a file.
+
+Bad input ends with status 2 and one line on standard error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import math
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from keystab import __version__
+from keystab.errors import InputError
+
+__all__ = ["main"]
+
+_BAD_INPUT = 2
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that reports an error in one line, without its usage."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(_BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0, 2 for input that cannot be worked with, 130 when interrupted.
+    """
+    args = _parser().parse_args(argv)
+    try:
+        args.run(args)
+        sys.stdout.flush()
+    except InputError as error:
+        return _refuse(args, str(error))
+    except MemoryError:
+        return _refuse(args, "the memory does not suffice; use a smaller picture or coarser steps")
+    except BrokenPipeError:  # whoever read the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        return _refuse(args, f"{error.filename or 'output'}: {error.strerror or error}")
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def _refuse(args: argparse.Namespace, message: str) -> int:
+    print(f"keystab {args.command}: {message}", file=sys.stderr)
+    return _BAD_INPUT
+
+
+def simulate(args: argparse.Namespace) -> None:
+    """Take a view of a picture with the simulated camera and write it."""
+    from keystab.camera import Scene, ViewSpec
+    from keystab.camera import simulate as take
+    from keystab.pictures import check_writable, read_picture, write_picture
+
+    check_writable(args.out)
+    # Bad values are refused before the picture is read, which also decides the default shape.
+    spec = ViewSpec(
+        args.blur,
+        args.step,
+        tuple(args.shape or (1, 1)),
+        tuple(args.shift),
+        math.radians(args.rotation),
+        args.noise,
+        args.seed,
+    )
+    scene = Scene(read_picture(args.picture))
+    if args.shape is None:
+        height, width = (int(n / args.step) for n in scene.shape)
+        if height < 1 or width < 1:
+            raise InputError(
+                f"step is {args.step:g}, more than a side of the picture of {scene.shape[0]} x "
+                f"{scene.shape[1]} pixels; give a smaller step or a shape"
+            )
+        spec = dataclasses.replace(spec, shape=(height, width))
+    view = take(scene, spec)
+    write_picture(view, args.out)
+    outside = int(((view < 0) | (view > 1)).sum())
+    clipped = f"; {outside} pixels clipped to [0, 1]" if outside and _is_png(args.out) else ""
+    print(
+        f"{args.out}: {view.shape[0]} x {view.shape[1]} pixels, camera blur {args.blur:g}{clipped}",
+        file=sys.stderr,
+    )
+
+
+def detect(args: argparse.Namespace) -> None:
+    """Detect the keypoints of a picture and write them as a table."""
+    from keystab.detection import detect_keypoints
+    from keystab.pictures import read_picture
+    from keystab.tables import check_writable, to_csv, write_table
+
+    if args.output is not None:
+        check_writable(args.output)
+    image = read_picture(args.picture)
+    options = {name: getattr(args, name) for name in args.parameters}
+    start = time.monotonic()
+    keypoints = detect_keypoints(image, **options)
+    seconds = time.monotonic() - start
+    if args.output is None:
+        sys.stdout.write(to_csv(keypoints))
+    else:
+        write_table(keypoints, args.output)
+    print(f"{args.picture}: {len(keypoints)} keypoints in {seconds:.1f} s", file=sys.stderr)
+
+
+def inspect(args: argparse.Namespace) -> None:
+    """Say in words what a store or a table holds."""
+    from keystab.inspection import describe
+
+    print(describe(args.path))
+
+
+def _is_png(path: Path) -> bool:
+    return path.suffix.lower() == ".png"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="keystab",
+        description="Simulated views, scale-space keypoints, and what files hold.",
+    )
+    parser.add_argument("--version", action="version", version=f"keystab {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _simulate_arguments(
+        commands.add_parser(
+            "simulate",
+            help="take a view of a picture with a simulated camera",
+            description="Blur a picture and sample it, as a camera that sees it would: exactly, "
+            "at any zoom, shift and rotation. The view is centred on the picture.",
+        )
+    )
+    _detect_arguments(
+        commands.add_parser(
+            "detect",
+            help="detect the keypoints of a picture",
+            description="Detect the extrema of the difference-of-Gaussians scale-space of a "
+            "picture, without any filter of contrast or edges.",
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        )
+    )
+    to = commands.add_parser(
+        "inspect",
+        help="say what a store or a table holds",
+        description="Say in words what a stored scale-space, a stored set of views or a table of "
+        "keypoints holds.",
+    )
+    to.add_argument("path", metavar="PATH", type=Path, help="store, .csv or .parquet table")
+    to.set_defaults(run=inspect)
+    return parser
+
+
+def _simulate_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=simulate)
+    to.add_argument("picture", metavar="PICTURE", type=Path, help="the scene: PNG, TIFF, JPEG, npy")
+    to.add_argument(
+        "out", metavar="OUT", type=Path,
+        help="view to write: .png (16 bits, clipped), .tiff (float32) or .npy (float64)",
+    )  # fmt: skip
+    to.add_argument(
+        "--blur", type=float, required=True, metavar="C",
+        help="camera blur: standard deviation of its Gaussian in view pixels",
+    )  # fmt: skip
+    to.add_argument(
+        "--step", type=float, required=True, metavar="S",
+        help="picture pixels per view pixel; the larger, the further away the camera",
+    )  # fmt: skip
+    to.add_argument(
+        "--shape", type=int, nargs=2, metavar=("H", "W"),
+        help="height and width of the view in pixels; by default all of the picture",
+    )  # fmt: skip
+    to.add_argument(
+        "--shift", type=float, nargs=2, default=(0.0, 0.0), metavar=("Y", "X"),
+        help="move the camera down and right by so many view pixels",
+    )  # fmt: skip
+    to.add_argument(
+        "--rotation", type=float, default=0.0, metavar="DEG",
+        help="turn the camera counter-clockwise about its centre, degrees",
+    )  # fmt: skip
+    to.add_argument(
+        "--noise", type=float, default=0.0, metavar="SD",
+        help="standard deviation of white noise, in units of the range [0, 1]",
+    )  # fmt: skip
+    to.add_argument(
+        "--seed", type=_seed, help="number or word that decides the noise; needed with --noise"
+    )
+
+
+def _detect_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=detect)
+    to.add_argument("picture", metavar="PICTURE", type=Path, help="PNG, TIFF, JPEG or npy")
+    to.add_argument(
+        "-o", "--output", metavar="OUT", type=Path, default=argparse.SUPPRESS,
+        help="table to write, .csv or .parquet; standard output if not given",
+    )  # fmt: skip
+    flags = [
+        to.add_argument(
+            "--camera-blur", type=float, required=True, metavar="C", default=argparse.SUPPRESS,
+            help="Gaussian blur that the picture already has, pixels",
+        ),
+        to.add_argument("--n-spo", type=int, default=3, metavar="N", help="scales per octave"),
+        to.add_argument(
+            "--delta-min", type=float, metavar="D",
+            help="distance of fine samples, pixels; balanced with the scales if not given",
+        ),
+        to.add_argument("--sigma-min", type=float, default=1.1, metavar="S", help="first scale"),
+        to.add_argument(
+            "--kappa", type=float, default=2 ** (1 / 3), metavar="K",
+            help="ratio of the two blurs of the difference of Gaussians",
+        ),
+        to.add_argument(
+            "--oversampling", choices=("spline", "cosine"), default="spline",
+            help="interpolant of the picture",
+        ),
+        to.add_argument(
+            "--epsilon", type=float, default=0.0, metavar="E",
+            help="least difference of an extremum to each of its 26 neighbours",
+        ),
+        to.add_argument(
+            "--refine", action=argparse.BooleanOptionalAction, default=True,
+            help="refine extrema by quadratic models, and discard those where that fails",
+        ),
+        to.add_argument(
+            "--max-offset", type=float, default=0.6, metavar="M",
+            help="largest accepted offset of a model, grid steps; inf for no limit",
+        ),
+        to.add_argument(
+            "--max-iterations", type=float, default=2, metavar="N",
+            help="most models for one extremum; inf for no limit",
+        ),
+        to.add_argument(
+            "--scale-moves", action=argparse.BooleanOptionalAction, default=True,
+            help="let a further model be made at another scale",
+        ),
+        to.add_argument(
+            "--move", choices=("nearest", "unit_step"), default="nearest",
+            help="where a further model is made",
+        ),
+        to.add_argument("--n-oct", type=int, default=1, metavar="N", help="octaves"),
+        to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
+    ]  # fmt: skip
+    to.set_defaults(parameters=[flag.dest for flag in flags], output=None)
+
+
+def _seed(text: str) -> int | str:
+    try:
+        return int(text)
+    except ValueError:
+        return text
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,58 @@
+"""Which detections of different samplings are compared (section 5.1, "Boundary effect").
+
+A sampling cannot find extrema in its first half scale step, so that coarse samplings reach less far
+down than fine ones; and the mirror at the border of the image moves with the sampling. Comparisons
+therefore keep to a common range of scales and away from the border.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+
+def comparable(
+    detections: pd.DataFrame,
+    shape: tuple[int, int],
+    sigma_min: float,
+    first_scale: float = 2 ** (1 / 3),
+    border: float = 3.0,
+    scale_column: str = "step_sigma",
+) -> NDArray[np.bool_]:
+    """Whether each detection lies in the common range of scales and inside the margin.
+
+    Parameters
+    ----------
+    detections : DataFrame
+        Columns ``y`` and ``x`` in input pixels, and `scale_column`.
+    shape : tuple of int
+        Height and width of the input image.
+    sigma_min : float
+        First scale of the scale-space, in input pixels.
+    first_scale : float
+        Lower end of the range of scales, over `sigma_min`.
+    border : float
+        Width of the margin around the centres of the outermost pixels, in input pixels.
+    scale_column : str
+        Column of the scale that is compared with the range. For discrete extrema this is the scale
+        after one unbounded quadratic step: their grid scale would admit a whole slice or none of
+        it, depending on the sampling.
+
+    Returns
+    -------
+    ndarray of bool
+        False also where the scale is NaN.
+
+    Examples
+    --------
+    >>> found = pd.DataFrame({"y": [5.0, 5.0, 2.0], "x": [5.0, 5.0, 5.0],
+    ...                       "step_sigma": [1.4, 1.38, 1.4]})
+    >>> comparable(found, (11, 11), sigma_min=1.1).tolist()
+    [True, False, False]
+    """
+    inside = detections[scale_column].to_numpy() >= sigma_min * first_scale
+    for axis, size in zip(("y", "x"), shape, strict=True):
+        position = detections[axis].to_numpy()
+        inside &= (position >= border) & (position <= size - 1 - border)
+    return inside

@@ -1,0 +1,278 @@
+"""Keypoint detection: discrete extrema, their refinement, and the seams between octaves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from scipy.spatial import cKDTree
+
+from keystab.dog_space import ScaleSpace, scale_space
+from keystab.errors import InputError
+from keystab.extrema import discrete_extrema
+from keystab.refinement import (
+    GRADIENT_COLUMNS,
+    HESSIAN_COLUMNS,
+    MOST_MODELS,
+    accepted,
+    positions,
+    quadratic_model,
+    stationary_point,
+    trace,
+)
+
+_NEIGHBOURS = np.delete(np.arange(27), 13)
+
+
+def detect_keypoints(
+    image: np.ndarray,
+    camera_blur: float,
+    n_spo: int = 3,
+    delta_min: float | None = None,
+    sigma_min: float = 1.1,
+    kappa: float = 2 ** (1 / 3),
+    oversampling: str = "spline",
+    epsilon: float = 0.0,
+    refine: bool = True,
+    max_offset: float = 0.6,
+    max_iterations: float = 2,
+    scale_moves: bool = True,
+    move: str = "nearest",
+    n_oct: int = 1,
+    threads: int = 1,
+) -> pd.DataFrame:
+    """Detect the keypoints of an image, without any filter of contrast or edges.
+
+    Implements the detector of sections 2 and 4 of the paper.
+
+    Parameters
+    ----------
+    image : array_like, shape (height, width)
+        Grey image; pixel centres at whole numbers, (0, 0) top left. The study uses values in
+        [0, 1]; positions do not depend on the range when `epsilon` is 0.
+    camera_blur : float
+        Gaussian blur c that the image already has, in pixels, 0 <= c <= sigma_min.
+    n_spo : int
+        Scales per octave.
+    delta_min : float, optional
+        Distance of fine samples in pixels; balanced with `n_spo` (equation 23) when omitted.
+    sigma_min : float
+        First scale in pixels.
+    kappa : float
+        Ratio of the two blurs of the difference of Gaussians, above 1.
+    oversampling : {"spline", "cosine"}
+        Interpolant of the image: the paper's cubic spline or the exact cosine series.
+    epsilon : float
+        By how much an extremum exceeds each of its 26 neighbours, in units of the image.
+    refine : bool
+        Whether extrema are refined, and discarded where that fails. False gives the discrete
+        extrema at their grid positions.
+    max_offset : float
+        M_offset, largest accepted offset of the quadratic model in grid steps.
+    max_iterations : float
+        N_interp, most quadratic models for one extremum; ``math.inf`` for no limit.
+    scale_moves : bool
+        Whether a further model may be made at another scale index.
+    move : {"nearest", "unit_step"}
+        Where a further model is made, see `keystab.refinement.trace`.
+    n_oct : int
+        Octaves; scales and sampling step double with each.
+    threads : int
+        Threads of the search. The result does not depend on it.
+
+    Returns
+    -------
+    DataFrame
+        One row per keypoint: ``y, x, sigma`` in pixels, DoG ``value``, ``sign`` (+1 maximum, -1
+        minimum), ``octave``; the discrete extremum's ``s, row, column`` and its smallest absolute
+        ``difference`` to a neighbour; with `refine` also the number of ``models`` made. A
+        constant image gives no rows.
+
+    Raises
+    ------
+    InputError
+        For an image that is not a finite two-dimensional array, or a parameter out of its range.
+
+    Notes
+    -----
+    Slices s = 1 .. n_spo of each octave are searched, so that octaves meet without overlap. Where
+    they meet, an extremum may be seen from both sides or from none, because the two grids differ.
+    Therefore both octaves are searched one slice beyond the seam; detections of one extremum on
+    both grids are recognised (same sign, within 1.5 samples of the coarser grid and one scale
+    step) and the refined scale on the finer grid decides which octave reports it.
+
+    Examples
+    --------
+    A Gaussian blob of standard deviation s before the camera is found at s / sqrt(kappa):
+
+    >>> y, x = np.mgrid[:41, :41]
+    >>> blob = np.exp(-((y - 20) ** 2 + (x - 20) ** 2) / (2 * (2.0**2 + 0.8**2)))
+    >>> found = detect_keypoints(blob, camera_blur=0.8, n_spo=15)
+    >>> found.loc[found["value"].idxmin(), ["y", "x", "sigma"]].round(2).tolist()
+    [20.0, 20.0, 1.78]
+    """
+    if isinstance(n_oct, bool) or not isinstance(n_oct, (int, np.integer)) or n_oct < 1:
+        raise InputError(f"n_oct is {n_oct!r}, allowed is a whole number of at least 1")
+    if not max_iterations >= 1:
+        raise InputError(f"max_iterations is {max_iterations!r}, allowed is a number of at least 1")
+    octaves = []
+    for octave in range(n_oct):
+        # One slice more on the side of each neighbouring octave.
+        slices = (-1 if octave else 0, n_spo + (3 if octave < n_oct - 1 else 2))
+        space = scale_space(
+            image, camera_blur, n_spo, delta_min, sigma_min, kappa, oversampling, octave, slices
+        )
+        table = extrema_table(space, discrete_extrema(space, epsilon, threads))
+        scale = table["step_sigma"]
+        if refine:
+            models = trace(
+                space,
+                table,
+                max_offset=max_offset,
+                move=move,
+                scale_moves=scale_moves,
+                max_models=int(min(max_iterations, MOST_MODELS)),
+            )
+            table = refined_table(space, table, models, max_offset, max_iterations)
+            scale = table["sigma"]
+        table["s"] += slices[0]
+        octaves.append(table.assign(octave=octave, scale=scale, step=space.sampling.step))
+    keep = _without_seams(octaves, n_spo, sigma_min)
+    names = ["y", "x", "sigma", "value", "sign", "octave", "s", "row", "column", "difference"]
+    names += ["models"] if refine else []
+    kept = [table.loc[mask, names] for table, mask in zip(octaves, keep, strict=True)]
+    return pd.concat(kept, ignore_index=True)
+
+
+def extrema_table(space: ScaleSpace, extrema: np.ndarray) -> pd.DataFrame:
+    """Describe discrete extrema by their neighbourhoods.
+
+    Parameters
+    ----------
+    space : ScaleSpace
+        Where they were found.
+    extrema : ndarray of int, shape (n, 4)
+        From `keystab.extrema.discrete_extrema`.
+
+    Returns
+    -------
+    DataFrame
+        One row per extremum: grid position ``y, x, sigma`` in input pixels, DoG ``value``,
+        ``sign``; indices ``s`` (0 for the first slice held), ``row, column``; smallest absolute
+        ``difference`` to the 26 neighbours; gradient ``g_s, g_y, g_x`` and Hessian ``h_ss, h_yy,
+        h_xx, h_sy, h_sx, h_yx`` by central differences per grid step; and where one unbounded
+        quadratic step leads: ``step_y, step_x, step_sigma, step_value`` (NaN for a singular
+        Hessian).
+    """
+    s, row, column, sign = extrema.T
+    cubes = space.neighbourhoods(s, row, column)
+    value = cubes[:, 1, 1, 1]
+    around = cubes.reshape(-1, 27)[:, _NEIGHBOURS]
+    gradient, hessian = quadratic_model(cubes)
+    alpha = stationary_point(gradient, hessian)
+    models = pd.DataFrame({"s": s, "row": row, "column": column})
+    models[["alpha_s", "alpha_y", "alpha_x"]] = alpha
+    step = positions(models, space.sampling)
+    table = pd.DataFrame(
+        {
+            "y": row * space.sampling.step,
+            "x": column * space.sampling.step,
+            "sigma": space.sigma[s],
+            "value": value,
+            "sign": sign,
+            "s": s,
+            "row": row,
+            "column": column,
+            "difference": np.abs(around - value[:, None]).min(axis=1, initial=np.inf),
+        }
+    )
+    for name, i in GRADIENT_COLUMNS.items():
+        table[name] = gradient[:, i]
+    for name, (i, j) in HESSIAN_COLUMNS.items():
+        table[name] = hessian[:, i, j]
+    table[["step_y", "step_x", "step_sigma"]] = step[["y", "x", "sigma"]]
+    table["step_value"] = value + 0.5 * np.einsum("ni,ni->n", gradient, alpha)
+    return table
+
+
+def refined_table(
+    space: ScaleSpace,
+    extrema: pd.DataFrame,
+    models: pd.DataFrame,
+    max_offset: float,
+    max_iterations: float,
+) -> pd.DataFrame:
+    """Keypoints that a refinement accepts.
+
+    Parameters
+    ----------
+    space : ScaleSpace
+        Where the extrema were found.
+    extrema : DataFrame
+        From `extrema_table`.
+    models : DataFrame
+        Their trace, from `keystab.refinement.trace`.
+    max_offset, max_iterations : float
+        M_offset and N_interp.
+
+    Returns
+    -------
+    DataFrame
+        Refined ``y, x, sigma, value`` with ``sign``, the indices ``s, row, column`` and
+        ``difference`` of the discrete extremum, and the number of ``models``.
+    """
+    good = accepted(models, max_offset, max_iterations)
+    table = positions(good, space.sampling)
+    table["value"] = good["value"]
+    origin = extrema.iloc[good["keypoint"].to_numpy()].reset_index(drop=True)
+    for name in ("sign", "s", "row", "column", "difference"):
+        table[name] = origin[name]
+    table["models"] = good["model"]
+    return table
+
+
+def _without_seams(octaves: list[pd.DataFrame], n_spo: int, sigma_min: float) -> list[np.ndarray]:
+    """Decide which detections each octave reports, see the notes of `detect_keypoints`."""
+    keep = []
+    for octave, table in enumerate(octaves):
+        s = table["s"].to_numpy()
+        first, last = octave == 0, octave == len(octaves) - 1
+        keep.append(((s >= 1) | first) & ((s <= n_spo) | last))
+    for octave in range(len(octaves) - 1):
+        finer, coarser = octaves[octave], octaves[octave + 1]
+        seam = sigma_min * 2.0 ** (octave + 1 + 0.5 / n_spo)
+        for i, j in _same_extremum(finer, coarser, n_spo):
+            below = bool(finer["scale"].iloc[i] < seam)
+            keep[octave][i], keep[octave + 1][j] = below, not below
+    return keep
+
+
+def _same_extremum(finer: pd.DataFrame, coarser: pd.DataFrame, n_spo: int) -> list[tuple[int, int]]:
+    """Pairs of detections at the seam of two octaves that are one extremum, each nearest."""
+    i = np.flatnonzero(finer["s"] >= n_spo)
+    j = np.flatnonzero(coarser["s"] <= 1)
+    if not (i.size and j.size):
+        return []
+    # Positions in units of the match: 1.5 coarse samples, one scale step; signs kept apart.
+    step = coarser["step"].iloc[0]
+    points = [
+        np.stack(
+            [
+                table["y"].iloc[k] / (1.5 * step),
+                table["x"].iloc[k] / (1.5 * step),
+                np.log2(table["scale"].iloc[k]) * n_spo,
+                10.0 * table["sign"].iloc[k],
+            ],
+            axis=1,
+        )
+        for table, k in ((finer, i), (coarser, j))
+    ]
+    points = [np.nan_to_num(p, nan=1e9, posinf=1e9, neginf=-1e9) for p in points]
+    near, nearest = cKDTree(points[1]).query(points[0], p=math.inf)
+    _, back = cKDTree(points[0]).query(points[1], p=math.inf)
+    return [
+        (int(i[a]), int(j[b]))
+        for a, (b, gap) in enumerate(zip(nearest, near, strict=True))
+        if gap <= 1 and back[b] == a
+    ]

@@ -1,0 +1,134 @@
+"""What every figure's command does: read tables, draw, write a PDF and a PNG.
+
+The bytes written depend on the tables, the code and the versions of the libraries, not on the
+time, the folder or the reader's matplotlib settings.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from keystab.errors import InputError
+from keystab.figures import style
+from keystab.files import written_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+Tables = Mapping[str, "DataFrame"]
+Needs = Mapping[str, Sequence[str]]
+
+_METADATA: dict[str, dict[str, Any]] = {
+    "pdf": {"Creator": "keystab", "Producer": None, "CreationDate": None},
+    "png": {"Software": None},
+}
+
+
+def read_tables(folder: Path | str, needs: Needs) -> dict[str, DataFrame]:
+    """Read the tables of a figure and check that they hold what it draws.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the tables.
+    needs : mapping from file name to column names
+        For example ``{"fig1.csv": ("sigma", "method")}``.
+
+    Returns
+    -------
+    dict from file name without its ending to DataFrame
+
+    Raises
+    ------
+    InputError
+        If a table is missing, has no rows or lacks a column.
+    """
+    from keystab.tables import read_table
+
+    tables = {}
+    for name, columns in needs.items():
+        path = Path(folder) / name
+        if not path.is_file():
+            raise InputError(
+                f"{path}: no such table; run the study, or give its folder as --tables"
+            )
+        tables[path.stem] = read_table(path, columns)
+    check_tables(tables, needs)
+    return tables
+
+
+def check_tables(tables: Tables, needs: Needs) -> None:
+    """Raise `InputError` if a table is missing, has no rows or lacks a column."""
+    for name, columns in needs.items():
+        table = tables.get(Path(name).stem)
+        if table is None:
+            raise InputError(f"{name}: the figure needs this table and was not given it")
+        missing = [column for column in columns if column not in table.columns]
+        if missing:
+            raise InputError(f"{name}: lacks the column(s) {', '.join(missing)}; remake the table")
+        if len(table) == 0:
+            raise InputError(f"{name}: has no rows, so there is nothing to draw; remake the table")
+
+
+def save(figure: Figure, path: Path | str) -> None:
+    """Write a figure as PDF or PNG by the ending of `path`; complete or not at all.
+
+    Raises
+    ------
+    InputError
+        If the ending is neither ``.pdf`` nor ``.png``, or the folder cannot be written.
+    """
+    path = Path(path)
+    kind = path.suffix.lstrip(".").lower()
+    if kind not in _METADATA:
+        raise InputError(f"{path}: a figure is written as .pdf or .png; change the ending")
+    try:
+        with style.context(), written_whole(path) as part:
+            figure.savefig(part, format=kind, metadata=_METADATA[kind])
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: cannot be written ({reason}); choose another folder") from None
+
+
+def main(
+    draw: Callable[[Tables, bool], Figure], needs: Needs, argv: Sequence[str] | None = None
+) -> int:
+    """Run the command of one figure.
+
+    Parameters
+    ----------
+    draw : callable
+        The figure's ``draw``.
+    needs : mapping
+        The figure's ``TABLES``.
+    argv : sequence of str, optional
+        Arguments; the process's own by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0, or 2 after a one-line message about the input.
+    """
+    parser = argparse.ArgumentParser(description=f"Draw a figure from {', '.join(needs)}.")
+    parser.add_argument("--tables", type=Path, required=True, help="folder that holds the tables")
+    parser.add_argument("--pdf", type=Path, help="PDF to write")
+    parser.add_argument("--png", type=Path, help="PNG to write, at 300 dots per inch")
+    parser.add_argument("--draft", action="store_true", help="mark the figure as a draft")
+    args = parser.parse_args(argv)
+    try:
+        if args.pdf is None and args.png is None:
+            raise InputError("nothing to write: give --pdf, --png or both")
+        tables = read_tables(args.tables, needs)
+        figure = draw(tables, args.draft)
+        for path in filter(None, (args.pdf, args.png)):
+            save(figure, path)
+            print(f"wrote {path}")
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0

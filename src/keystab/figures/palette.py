@@ -1,0 +1,123 @@
+"""What colour things have: the same one in every figure.
+
+Colours of lines are the Okabe-Ito set or darker shades of it, which stay distinct for the common
+colour blindnesses; stability is cividis (blue: detected once, yellow: always detected), which is
+perceptually uniform and nearly the same for every reader.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.colors import Colormap
+
+INK, GREY, PALE = "#222222", "#6e6e6e", "#d9d9d9"
+"""Text, secondary text and guide lines, backgrounds."""
+
+FRAME = "#F0A000"
+"""Frames on photographs."""
+
+STABILITY_MAP = "cividis"
+"""Colour map of a keypoint's stability, from 0 (blue) to 1 (yellow)."""
+
+LABEL_COLOURS = {"stable": "#a67c00", "unstable": "#1f3f77", "between": "#8c8c8c"}
+"""Stable and unstable keypoints: the ends of `STABILITY_MAP`, the yellow darkened for lines."""
+
+SURFACE_COLOURS = {"stable": "#EBC94F", "unstable": "#6F8FCB"}
+"""The same two groups as shaded surfaces, lighter so that shadows show."""
+
+OTHERS_COLOUR = "#ececec"
+"""Surfaces that are there and not the subject."""
+
+DETECTION_COLOURS = {"discrete": "#D55E00", "refined": "#0072B2"}
+"""Extrema on the grid, and after refinement by the quadratic model."""
+
+METHOD_COLOURS = {"sampled": "#D55E00", "dct": "#0072B2", "discrete_analogue": "#009E73"}
+"""Ways to blur (figure 1)."""
+
+FEATURE_COLOURS = {
+    "dog": "#D55E00",
+    "difference": "#0072B2",
+    "laplacian": "#009E73",
+    "condition": "#A8458A",
+}
+"""Predictors of stability (figure 5)."""
+
+CHANGE_COLOURS = {"new": "#009E73", "lost": "#D55E00"}
+"""Detections that a change of the sampling adds and removes (figure 4)."""
+
+BALANCED_COLOUR = INK
+"""The balanced sampling curve."""
+
+CONDITION_COLOUR = "#A8216B"
+"""The condition number of the Hessian along the balanced curve: a shade of its heat map."""
+
+
+def n_spo_colour(n_spo: int, lowest: int = 3, highest: int = 19) -> tuple[float, float, float]:
+    """Return the colour of a sampling: light for few scales per octave, dark for many.
+
+    Parameters
+    ----------
+    n_spo : int
+        Scales per octave; values outside the range take the colour of its nearer end.
+    lowest, highest : int
+        The range of the study.
+
+    Examples
+    --------
+    >>> n_spo_colour(2) == n_spo_colour(3) != n_spo_colour(15)
+    True
+    """
+    import seaborn
+
+    share = min(max((n_spo - lowest) / (highest - lowest), 0.0), 1.0)
+    red, green, blue = seaborn.color_palette("mako_r", as_cmap=True)(0.2 + 0.7 * share)[:3]
+    return red, green, blue
+
+
+def stability_map() -> Colormap:
+    """Return the colour map of stability; "not detected" (masked, NaN) is white."""
+    import matplotlib
+
+    return matplotlib.colormaps[STABILITY_MAP].with_extremes(bad="white")
+
+
+def count_map() -> Colormap:
+    """Return the colour map of counts: pale to dark blue, perceptually uniform."""
+    return _middle("mako_r", 0.06, 0.82)
+
+
+def condition_map() -> Colormap:
+    """Return the colour map of condition numbers: pale to dark red, perceptually uniform."""
+    return _middle("rocket_r", 0.04, 0.80)
+
+
+def _middle(name: str, start: float, stop: float) -> Colormap:
+    """Return the part of one of seaborn's colour maps on which black or white text can be read."""
+    import seaborn
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(seaborn.color_palette(name, as_cmap=True)(np.linspace(start, stop, 256)))
+
+
+def readable_on(colour: Sequence[float]) -> str:
+    """Return the colour of text that stands out on a background: dark or white.
+
+    Parameters
+    ----------
+    colour : sequence of float
+        Red, green and blue of the background in [0, 1]; more values are ignored.
+
+    Examples
+    --------
+    >>> readable_on((0.0, 0.0, 0.4)), readable_on((0.9, 0.9, 0.2)) == INK
+    ('white', True)
+    """
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour[:3]]
+    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    # Contrast is (lighter + 0.05) / (darker + 0.05), and INK has a luminance of 0.016.
+    return "white" if 1.05 / (luminance + 0.05) > (luminance + 0.05) / 0.066 else INK

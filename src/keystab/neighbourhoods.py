@@ -1,0 +1,171 @@
+"""Cubes of 3 x 3 x 3 samples of a scale-space, evaluated one by one.
+
+The refinement of an extremum looks at neighbourhoods that may lie anywhere. Each is a sum over the
+few source coefficients in reach, so that none needs a tile, and its digits never depend on how the
+scale-space was cut up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from keystab.operators import (
+    AxisOperator,
+    CosineAxis,
+    SplineAxis,
+    blurred_spline_rows,
+    fold_range,
+)
+
+# Candidates handled at once in cosine mode: bounds the memory of their cosines.
+_BATCH = 256
+
+_fold_range = njit(cache=True, nogil=True)(fold_range)
+
+
+def spline_neighbourhoods(
+    source: np.ndarray,
+    axes: tuple[AxisOperator, AxisOperator],
+    lower: np.ndarray,
+    upper: np.ndarray,
+    s: np.ndarray,
+    row: np.ndarray,
+    column: np.ndarray,
+) -> np.ndarray:
+    """Cubes around samples of a spline scale-space, shape (n, 3, 3, 3)."""
+    y_axis, x_axis = axes
+    assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
+    cubes = np.zeros((s.size, 3, 3, 3))
+    _spline_cubes(
+        source,
+        (y_axis.taps, y_axis.reach, y_axis.column, y_axis.weight),
+        (x_axis.taps, x_axis.reach, x_axis.column, x_axis.weight),
+        y_axis.stride,
+        lower,
+        upper,
+        s,
+        row,
+        column,
+        cubes,
+    )
+    return cubes
+
+
+def cosine_neighbourhoods(
+    source: np.ndarray,
+    axes: tuple[AxisOperator, AxisOperator],
+    lower: np.ndarray,
+    upper: np.ndarray,
+    s: np.ndarray,
+    row: np.ndarray,
+    column: np.ndarray,
+) -> np.ndarray:
+    """Cubes around samples of a cosine scale-space, shape (n, 3, 3, 3)."""
+    y_axis, x_axis = axes
+    assert isinstance(y_axis, CosineAxis) and isinstance(x_axis, CosineAxis)
+    cubes = np.zeros((s.size, 3, 3, 3))
+    around = np.arange(-1, 2)
+    for start in range(0, s.size, _BATCH):
+        part = slice(start, start + _BATCH)
+        _cosine_cubes(
+            source,
+            y_axis.basis(row[part, None] + around),
+            x_axis.basis(column[part, None] + around),
+            (y_axis.gain, y_axis.n_frequencies),
+            (x_axis.gain, x_axis.n_frequencies),
+            lower,
+            upper,
+            s[part],
+            cubes[part],
+        )
+    return cubes
+
+
+@njit(cache=True, nogil=True)
+def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, cubes):  # noqa: PLR0913
+    y_taps, y_reach, y_column, y_weight = y_axis
+    x_taps, x_reach, x_column, x_weight = x_axis
+    y_rows = np.empty((3, source.shape[0]))
+    x_rows = np.empty((3, source.shape[1]))
+    for k in range(s.size):
+        for a in range(3):
+            for pair in range(2):
+                blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
+                y_first, y_last = _rows_around(
+                    row[k], stride, y_taps[blur], y_reach[blur], y_column, y_weight, y_rows
+                )
+                x_first, x_last = _rows_around(
+                    column[k], stride, x_taps[blur], x_reach[blur], x_column, x_weight, x_rows
+                )
+                _add_products(
+                    source[y_first:y_last, x_first:x_last],
+                    y_rows[:, : y_last - y_first],
+                    x_rows[:, : x_last - x_first],
+                    1.0 if pair == 0 else -1.0,
+                    cubes[k, a],
+                )
+
+
+@njit(cache=True, nogil=True)
+def _rows_around(index, stride, taps, reach, column, weight, rows):
+    """Rows index - 1 .. index + 1 of the blurred spline, and the columns that they span."""
+    low, high = _fold_range((index - 1) * stride - reach, (index + 1) * stride + reach, column.size)
+    first, last = column[low], column[high] + 4
+    rows[:, : last - first] = 0.0
+    blurred_spline_rows(
+        (index - 1) * stride,
+        stride,
+        taps,
+        reach,
+        column,
+        weight,
+        first,
+        rows[:, : last - first],
+    )
+    return first, last
+
+
+@njit(cache=True, nogil=True)
+def _cosine_cubes(source, y_basis, x_basis, y_axis, x_axis, lower, upper, s, cubes):  # noqa: PLR0913
+    y_gain, y_count = y_axis
+    x_gain, x_count = x_axis
+    y_rows = np.empty((3, source.shape[0]))
+    x_rows = np.empty((3, source.shape[1]))
+    for k in range(s.size):
+        for a in range(3):
+            for pair in range(2):
+                blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
+                n_y, n_x = y_count[blur], x_count[blur]
+                for b in range(3):
+                    for i in range(n_y):
+                        y_rows[b, i] = y_basis[k, b, i] * y_gain[blur, i]
+                    for j in range(n_x):
+                        x_rows[b, j] = x_basis[k, b, j] * x_gain[blur, j]
+                _add_products(
+                    source[:n_y, :n_x],
+                    y_rows[:, :n_y],
+                    x_rows[:, :n_x],
+                    1.0 if pair == 0 else -1.0,
+                    cubes[k, a],
+                )
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_products(source, y_rows, x_rows, sign, out):
+    """Add ``sign * y_rows @ source @ x_rows.T`` (3 x 3) to `out`, in a fixed order of sums."""
+    n_y, n_x = source.shape
+    lines = np.zeros((3, n_x))
+    for i in range(n_y):
+        before, here, after = y_rows[0, i], y_rows[1, i], y_rows[2, i]
+        for j in range(n_x):
+            value = source[i, j]
+            lines[0, j] += before * value
+            lines[1, j] += here * value
+            lines[2, j] += after * value
+    for b in range(3):
+        for e in range(3):
+            total = 0.0
+            for j in range(n_x):
+                total += lines[b, j] * x_rows[e, j]
+            out[b, e] += sign * total

@@ -1,0 +1,306 @@
+"""Oversampling and Gaussian blur of one image axis as one matrix.
+
+Oversampling and blur are linear and separable, so that along one axis "interpolate on the fine
+grid, then blur by a Gaussian" is a matrix L(blur) with one row per fine sample. A blurred fine
+image is ``L_y C L_x^T`` with C the source of the interpolant. Only the rows of a tile are ever
+built, and of these only the columns that matter.
+
+Two interpolants of the input image are offered (section 2.3 of the paper uses the first):
+
+``spline``
+    A cubic B-spline, sampled on the fine grid, then blurred by the discrete cosine transform of
+    that grid. The source is the array of spline coefficients. The spline is local and so is the
+    Gaussian: a row has some tens of columns, whatever the size of the image.
+``cosine``
+    The finite cosine series that the half-sample symmetric image is. The source is the array of
+    its coefficients; blur is a multiplication, exact for the continuous Gaussian. Rows are not
+    local: a column is a frequency.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import scipy.fft
+import scipy.ndimage
+from numba import njit
+
+from keystab import cosine
+
+# Kernel values below this do not reach the last digit of a blurred image in [0, 1]; it is also
+# where the rounding of the transform that makes the kernel begins.
+_NEGLIGIBLE = 1e-17
+
+# Half-sample mirror of the spline coefficients on either side, so that the four columns of a row
+# are always neighbours.
+_PADDING = 2
+
+
+class AxisOperator(Protocol):
+    """Rows of L(blur) for one axis and several blurs."""
+
+    def block(self, start: int, stop: int) -> Block:
+        """Rows `start` to `stop` for every blur."""
+
+
+class Block(NamedTuple):
+    """Rows of L for a range of fine samples, ``L(blur) = expand @ factors[blur]``.
+
+    Attributes
+    ----------
+    expand : ndarray, shape (n_rows, rank), or None
+        What all blurs have in common; None stands for the identity.
+    factors : list of (int, ndarray)
+        For every blur the first column of the source that counts and the matrix of those
+        columns, shape (rank, n_columns).
+    """
+
+    expand: np.ndarray | None
+    factors: list[tuple[int, np.ndarray]]
+
+
+class SplineAxis:
+    """Cubic B-spline oversampling followed by the cosine-domain Gaussian of the fine grid.
+
+    The coefficients are those of a whole-sample mirror (the usual prefilter); evaluation beyond
+    the image uses the half-sample mirror, which is also the symmetry of the cosine transform on
+    the fine grid.
+
+    Parameters
+    ----------
+    n_samples : int
+        Samples m of the first octave's fine grid; sample i lies at ``i * delta_min``.
+    n_pixels : int
+        Pixels n of the input image along this axis.
+    delta_min : float
+        Distance of adjacent fine samples in input pixels.
+    stride : int
+        Fine samples from one row to the next (1 for the first octave).
+    blurs : ndarray, shape (n_blurs,)
+        Gaussian standard deviations in input pixels.
+    """
+
+    def __init__(
+        self, n_samples: int, n_pixels: int, delta_min: float, stride: int, blurs: np.ndarray
+    ) -> None:
+        self.n_samples = n_samples
+        self.stride = stride
+        self.column, self.weight = spline_rows(n_samples, n_pixels, delta_min)
+        kernels = [cosine_domain_kernel(n_samples, blur / delta_min) for blur in blurs]
+        self.reach = np.array([kernel.size - 1 for kernel in kernels])
+        self.taps = np.zeros((len(kernels), self.reach.max() + 1))
+        for row, kernel in zip(self.taps, kernels, strict=True):
+            row[: kernel.size] = kernel
+
+    def block(self, start: int, stop: int) -> Block:
+        """See `AxisOperator.block`."""
+        factors = []
+        for taps, reach in zip(self.taps, self.reach, strict=True):
+            low, high = fold_range(
+                start * self.stride - reach, (stop - 1) * self.stride + reach, self.n_samples
+            )
+            first = int(self.column[low])
+            rows = np.zeros((stop - start, int(self.column[high]) + 4 - first))
+            blurred_spline_rows(
+                start * self.stride, self.stride, taps, reach, self.column, self.weight, first, rows
+            )
+            factors.append((first, rows))
+        return Block(None, factors)
+
+
+class CosineAxis:
+    """Evaluation of the input's own cosine series after a continuous Gaussian blur.
+
+    Parameters
+    ----------
+    n_samples, n_pixels, delta_min, stride, blurs
+        As for `SplineAxis`.
+    """
+
+    def __init__(
+        self, n_samples: int, n_pixels: int, delta_min: float, stride: int, blurs: np.ndarray
+    ) -> None:
+        self.n_pixels = n_pixels
+        self.spacing = delta_min * stride
+        self.gain = np.array([cosine.gaussian(n_pixels, blur) for blur in blurs])
+        self.n_frequencies = np.array([cosine.significant(n_pixels, blur) for blur in blurs])
+
+    def block(self, start: int, stop: int) -> Block:
+        """See `AxisOperator.block`; the columns are the lowest frequencies.
+
+        On a short interval, functions with a band limit of half a cycle per pixel span a space
+        of few dimensions, about one per pixel and a dozen more. Its basis is the same for all
+        blocks of one length.
+        """
+        expand = band_limited_basis(stop - start, self.spacing)
+        rows = self.basis(np.arange(start, stop))
+        common = rows if expand is None else expand.T @ rows
+        factors = [
+            (0, common[:, :count] * gain[:count])
+            for count, gain in zip(self.n_frequencies, self.gain, strict=True)
+        ]
+        return Block(expand, factors)
+
+    def basis(self, rows: np.ndarray, count: int | None = None) -> np.ndarray:
+        """Cosines of the lowest frequencies at fine samples, shape rows.shape + (count,)."""
+        return cosine.basis(np.asarray(rows) * self.spacing, self.n_pixels, count)
+
+
+def spline_source(image: np.ndarray) -> np.ndarray:
+    """Spline coefficients of an image less its mean, with two mirrored ones on every side.
+
+    A difference of Gaussians does not see the mean; without it rounding errors shrink, and a
+    constant image is zero.
+    """
+    coefficients = image - image.mean()
+    for axis in (0, 1):
+        if image.shape[axis] > 1:
+            coefficients = scipy.ndimage.spline_filter1d(
+                coefficients, order=3, axis=axis, mode="mirror", output=np.float64
+            )
+    return np.pad(coefficients, _PADDING, mode="symmetric")
+
+
+def cosine_source(image: np.ndarray) -> np.ndarray:
+    """Cosine series coefficients of an image, without the constant term."""
+    a = cosine.coefficients(image)
+    a[0, 0] = 0.0
+    return a
+
+
+def spline_rows(n_samples: int, n_pixels: int, delta_min: float) -> tuple[np.ndarray, np.ndarray]:
+    """Cubic B-spline weights of every fine sample.
+
+    Returns
+    -------
+    column : ndarray of int, shape (n_samples,)
+        First of four adjacent columns of the padded coefficients.
+    weight : ndarray, shape (n_samples, 4)
+        Weights of those four coefficients.
+    """
+    position = np.arange(n_samples) * delta_min
+    # delta_min may round position to just beyond the last pixel's cell.
+    knot = np.minimum(np.floor(position), n_pixels - 1).astype(np.int64)
+    t = position - knot
+    weight = np.stack(
+        [
+            (1 - t) ** 3 / 6,
+            (4 - 6 * t**2 + 3 * t**3) / 6,
+            (1 + 3 * t + 3 * t**2 - 3 * t**3) / 6,
+            t**3 / 6,
+        ],
+        axis=1,
+    )
+    return knot - 1 + _PADDING, weight
+
+
+def cosine_domain_kernel(n_samples: int, blur: float) -> np.ndarray:
+    r"""One side of the kernel by which the cosine-domain Gaussian of a grid convolves.
+
+    Multiplying the cosine transform of m samples by :math:`e^{-b^2 (\pi k / m)^2 / 2}` is a
+    circular convolution of the mirrored signal, of period 2m. Its kernel is *not* the sampled
+    Gaussian: for blurs below about 2.7 samples the band limit of the grid shows, as a tail that
+    hardly decays. The tail is cut where it no longer counts in double precision.
+
+    Parameters
+    ----------
+    n_samples : int
+        Samples m of the grid.
+    blur : float
+        Standard deviation b in samples; 0 is the identity.
+
+    Returns
+    -------
+    ndarray, shape (reach + 1,)
+        Kernel values at distances 0 .. reach, reach <= m.
+
+    Examples
+    --------
+    >>> kernel = cosine_domain_kernel(400, 3.0)
+    >>> abs(kernel[0] - 1 / (3 * (2 * np.pi) ** 0.5)) < 1e-15
+    np.True_
+    """
+    if blur == 0:
+        return np.ones(1)
+    frequency = np.pi * np.arange(n_samples + 1) / n_samples
+    kernel = scipy.fft.irfft(np.exp(-0.5 * (blur * frequency) ** 2), 2 * n_samples)
+    kernel = kernel[: n_samples + 1]
+    reach = int(np.flatnonzero(np.abs(kernel) > _NEGLIGIBLE)[-1])
+    return np.ascontiguousarray(kernel[: reach + 1])
+
+
+@lru_cache(maxsize=16)
+def band_limited_basis(n_samples: int, spacing: float) -> np.ndarray | None:
+    """Orthonormal basis of band-limited functions on an interval.
+
+    Parameters
+    ----------
+    n_samples : int
+        Samples of the interval.
+    spacing : float
+        Their distance in pixels; the band limit is half a cycle per pixel.
+
+    Returns
+    -------
+    ndarray, shape (n_samples, rank), or None
+        Columns that span every such function to the last digit; None where that takes about as
+        many as there are samples.
+    """
+    span = (n_samples - 1) * spacing
+    # Frequencies dense enough that the waves between them add nothing new to the interval.
+    frequency = np.linspace(0.0, np.pi, int(4 * span) + 64)
+    phase = np.multiply.outer((np.arange(n_samples) - (n_samples - 1) / 2) * spacing, frequency)
+    waves = np.hstack([np.cos(phase), np.sin(phase)])
+    left, singular, _ = np.linalg.svd(waves, full_matrices=False)
+    rank = int((singular > 1e-16 * singular[0] * np.sqrt(n_samples)).sum())
+    return np.ascontiguousarray(left[:, :rank]) if rank < 0.7 * n_samples else None
+
+
+def fold_range(low: int, high: int, n_samples: int) -> tuple[int, int]:
+    """Smallest and largest grid index that `low` .. `high` touch after half-sample mirroring."""
+    first, last = max(low, 0), min(high, n_samples - 1)
+    if low < 0:
+        last = max(last, min(-1 - low, n_samples - 1))
+    if high >= n_samples:
+        first = min(first, max(2 * n_samples - 1 - high, 0))
+    return first, last
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def blurred_spline_rows(start, stride, taps, reach, column, weight, first, out):  # noqa: PLR0913
+    """Fill `out` (zeroed) with rows ``start, start + stride, ...`` of the blurred spline.
+
+    The four weights of consecutive fine samples meet the same four columns until the next knot
+    is passed, so that sums are kept in registers until then.
+    """
+    n_samples = column.size
+    for row in range(out.shape[0]):
+        centre = start + row * stride
+        here = -1
+        a0 = a1 = a2 = a3 = 0.0
+        # A kernel as long as the grid holds the distance m once, not twice.
+        for distance in range(-reach if reach < n_samples else 1 - reach, reach + 1):
+            sample = centre + distance
+            if sample < 0:
+                sample = -1 - sample
+            elif sample >= n_samples:
+                sample = 2 * n_samples - 1 - sample
+            if column[sample] != here:
+                if here >= 0:
+                    out[row, here - first] += a0
+                    out[row, here - first + 1] += a1
+                    out[row, here - first + 2] += a2
+                    out[row, here - first + 3] += a3
+                here = column[sample]
+                a0 = a1 = a2 = a3 = 0.0
+            tap = taps[abs(distance)]
+            a0 += tap * weight[sample, 0]
+            a1 += tap * weight[sample, 1]
+            a2 += tap * weight[sample, 2]
+            a3 += tap * weight[sample, 3]
+        out[row, here - first] += a0
+        out[row, here - first + 1] += a1
+        out[row, here - first + 2] += a2
+        out[row, here - first + 3] += a3

@@ -1,0 +1,120 @@
+"""What all stages share: arguments, logging of results, and errors in one line."""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import functools
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+# Matrix products differ in the last bits between numbers of threads. To be set before numpy is
+# imported; Snakemake sets the same from a rule's threads.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+from keystab.errors import InputError  # noqa: E402
+
+T = TypeVar("T")
+Main = Callable[[Sequence[str] | None], None]
+
+
+def stage(main: Main) -> Callable[..., int]:
+    """Turn a function of the command line into a command that explains its failures.
+
+    The command returns 0, or 2 after one line on standard error about its input, its disk or its
+    memory. Any other failure is a defect of this program: its traceback is shown, last line last.
+    """
+
+    @functools.wraps(main)
+    def command(argv: Sequence[str] | None = None) -> int:
+        try:
+            main(argv)
+        except InputError as error:
+            print(f"error: {error}", file=sys.stderr)
+            return 2
+        except MemoryError as error:
+            print(f"error: the memory does not suffice: {error}", file=sys.stderr)
+            return 2
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES):
+                raise
+            print(f"error: {error.filename or 'output'}: {error.strerror}", file=sys.stderr)
+            return 2
+        return 0
+
+    return command
+
+
+def parser(description: str | None) -> argparse.ArgumentParser:
+    """Parser of a stage's command line, described by the module's docstring."""
+    return argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+
+
+def required(to: argparse.ArgumentParser, name: str, what: str, **options: object) -> None:
+    """Add an argument that must be given; the rules of the workflow know all defaults."""
+    to.add_argument(f"--{name}", required=True, help=what, **options)  # type: ignore[arg-type]
+
+
+def views_arguments(to: argparse.ArgumentParser) -> None:
+    """Add the store of views and its seal."""
+    required(to, "views", "store of the views", type=Path)
+    required(to, "views-digest", "seal of the store", type=Path)
+
+
+def detector_arguments(to: argparse.ArgumentParser) -> None:
+    """Add what defines the difference-of-Gaussians scale-space."""
+    scale_arguments(to)
+    required(to, "oversampling", "spline or cosine")
+
+
+def scale_arguments(to: argparse.ArgumentParser) -> None:
+    """Add first scale and ratio of the difference of Gaussians."""
+    required(to, "sigma-min", "first scale in pixels", type=float)
+    required(to, "kappa", "ratio of the two blurs", type=float)
+
+
+def range_arguments(to: argparse.ArgumentParser) -> None:
+    """Add what decides which detections are compared."""
+    required(to, "border", "pixels left out at the border of the view", type=float)
+    required(to, "first-scale", "lower end of the scale range, over sigma-min", type=float)
+
+
+def same_arguments(to: argparse.ArgumentParser) -> None:
+    """Add what decides when two detections are the same."""
+    required(to, "space-tolerance", "largest distance in y and in x, pixels", type=float)
+    required(to, "scale-ratio", "largest ratio of scales", type=float)
+    required(to, "match-sign", "whether the signs must agree", type=boolean)
+
+
+def label_arguments(to: argparse.ArgumentParser) -> None:
+    """Add what decides which keypoints are stable."""
+    required(to, "stable-above", "share of samplings above which a keypoint is stable", type=float)
+    required(to, "unstable-below", "share of samplings below which it is unstable", type=float)
+
+
+def boolean(text: str) -> bool:
+    """Read true or false.
+
+    Examples
+    --------
+    >>> boolean("True"), boolean("false")
+    (True, False)
+    """
+    if text.lower() not in ("true", "false"):
+        raise argparse.ArgumentTypeError(f"{text!r}, allowed is true or false")
+    return text.lower() == "true"
+
+
+def optional(kind: Callable[[str], T]) -> Callable[[str], T | None]:
+    """Read a value that may be None."""
+
+    def read(text: str) -> T | None:
+        return None if text == "None" else kind(text)
+
+    return read

@@ -1,0 +1,42 @@
+"""Cut cubes out of a very dense scale-space, around stable and unstable keypoints (figure 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from keystab.stages import _run
+
+
+@_run.stage
+def main(argv: Sequence[str] | None = None) -> None:
+    """Read the view and the unique keypoints; write a table of cubes and one of their samples."""
+    parser = _run.parser(__doc__)
+    _run.views_arguments(parser)
+    _run.required(parser, "keypoints", "table of unique keypoints", type=Path)
+    _run.required(parser, "n-spo", "scales per octave of the dense scale-space", type=int)
+    _run.required(parser, "per-group", "stable keypoints, and unstable ones", type=int)
+    _run.detector_arguments(parser)
+    _run.label_arguments(parser)
+    _run.required(parser, "panels", "table of cubes to write", type=Path)
+    _run.required(parser, "cubes", "table of samples to write", type=Path)
+    args = parser.parse_args(argv)
+
+    from keystab.cubes import cubes_around, dense_scale_space, drawn
+    from keystab.stages._inputs import read_view
+    from keystab.tables import read_table, write_table
+
+    view = read_view(args.views, args.views_digest)
+    space = dense_scale_space(
+        view.image, view.blur, args.n_spo, args.sigma_min, args.kappa, args.oversampling
+    )
+    keypoints = drawn(
+        read_table(args.keypoints), space, args.stable_above, args.unstable_below, args.per_group
+    )
+    panels, cubes = cubes_around(space, keypoints)
+    write_table(panels, args.panels)
+    write_table(cubes, args.cubes)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

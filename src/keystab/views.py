@@ -1,0 +1,196 @@
+"""Views of a scene: how one is described, and where its pixels look."""
+
+from __future__ import annotations
+
+import math
+import operator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from keystab.errors import InputError
+
+__all__ = ["ViewSpec", "effective_blur", "to_reference", "to_view"]
+
+
+@dataclass(frozen=True)
+class ViewSpec:
+    """One view of a scene: where the camera stands, what it blurs, and its noise.
+
+    Parameters
+    ----------
+    blur : float
+        Camera blur c: standard deviation of its Gaussian in view pixels, >= 0.
+    step : float
+        Subsampling step S: reference pixels per view pixel, > 0. The zoom.
+    shape : (int, int)
+        Height and width of the view in pixels.
+    shift : (float, float)
+        Displacement of the camera in view pixels, (down, right), along the axes of the view.
+    rotation : float
+        Angle in radians by which the camera is turned about its centre, counter-clockwise as seen
+        on a screen. The scene then appears turned clockwise.
+    noise : float
+        Standard deviation of white Gaussian noise, in units of the range [0, 1].
+    seed : int, str or tuple of them, optional
+        What the noise is for, for `random_generator`. Needed where there is noise.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range, or there is noise without a seed.
+
+    Examples
+    --------
+    >>> ViewSpec(blur=1.1, step=10.0, shape=(225, 400)).rotation
+    0.0
+    """
+
+    blur: float
+    step: float
+    shape: tuple[int, int]
+    shift: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    noise: float = 0.0
+    seed: int | str | tuple[int | str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        _check_number("camera blur", self.blur, "a number of view pixels, 0 or more", least=0.0)
+        _check_number("noise", self.noise, "a standard deviation, 0 or more", least=0.0)
+        _check_number("rotation", self.rotation, "a finite angle in radians")
+        _check_number("step", self.step, "a number of reference pixels above 0", least=0.0)
+        if self.step == 0:
+            raise InputError("step is 0; give a number of reference pixels above 0")
+        if len(self.shift) != 2:
+            raise InputError(f"shift is {self.shift}; give two numbers of view pixels: down, right")
+        for component in self.shift:
+            _check_number("shift", component, "finite numbers of view pixels: down, right")
+        try:
+            height, width = (operator.index(size) for size in self.shape)
+        except (TypeError, ValueError):
+            height = width = 0
+        if height < 1 or width < 1:
+            raise InputError(f"shape is {self.shape}; give a height and a width of 1 pixel or more")
+        if self.noise > 0 and self.seed is None:
+            raise InputError(
+                "noise without a seed would differ from run to run; "
+                "give a seed that says what the noise is for"
+            )
+
+
+def to_reference(
+    spec: ViewSpec, reference_shape: tuple[int, int], y: ArrayLike, x: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where positions of a view lie in the reference.
+
+    Parameters
+    ----------
+    spec : ViewSpec
+        The view.
+    reference_shape : (int, int)
+        Height and width of the reference in pixels.
+    y, x : array_like
+        Positions in view pixels; shapes that broadcast.
+
+    Returns
+    -------
+    y, x : ndarray of float64
+        Positions in reference pixels.
+
+    Examples
+    --------
+    >>> spec = ViewSpec(blur=1.0, step=10.0, shape=(225, 400))
+    >>> y, x = to_reference(spec, (2250, 4000), 0, 399)
+    >>> float(y), float(x)
+    (4.5, 3994.5)
+    """
+    cos, sin = _rotation(spec.rotation)
+    (mid_y, mid_x), (ref_y, ref_x) = _centre(spec.shape), _centre(reference_shape)
+    down = np.asarray(y, dtype=np.float64) - mid_y + spec.shift[0]
+    right = np.asarray(x, dtype=np.float64) - mid_x + spec.shift[1]
+    # y points down, so a counter-clockwise turn takes "right" towards smaller y.
+    return (
+        ref_y + spec.step * (cos * down - sin * right),
+        ref_x + spec.step * (sin * down + cos * right),
+    )
+
+
+def to_view(
+    spec: ViewSpec, reference_shape: tuple[int, int], y: ArrayLike, x: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where positions of the reference appear in a view: the inverse of `to_reference`.
+
+    Parameters
+    ----------
+    spec : ViewSpec
+        The view.
+    reference_shape : (int, int)
+        Height and width of the reference in pixels.
+    y, x : array_like
+        Positions in reference pixels; shapes that broadcast.
+
+    Returns
+    -------
+    y, x : ndarray of float64
+        Positions in view pixels.
+
+    Examples
+    --------
+    >>> spec = ViewSpec(blur=1.0, step=10.0, shape=(225, 400), shift=(0.0, 2.0))
+    >>> y, x = to_view(spec, (2250, 4000), 4.5, 4.5)
+    >>> float(y), float(x)
+    (0.0, -2.0)
+    """
+    cos, sin = _rotation(spec.rotation)
+    (mid_y, mid_x), (ref_y, ref_x) = _centre(spec.shape), _centre(reference_shape)
+    dy = (np.asarray(y, dtype=np.float64) - ref_y) / spec.step
+    dx = (np.asarray(x, dtype=np.float64) - ref_x) / spec.step
+    return mid_y - spec.shift[0] + cos * dy + sin * dx, mid_x - spec.shift[1] - sin * dy + cos * dx
+
+
+def effective_blur(blur: float, step: float, reference_blur: float) -> float:
+    """Blur of a view whose reference is itself blurred, sqrt(c^2 + (c_ref/S)^2) (section 4).
+
+    Parameters
+    ----------
+    blur : float
+        Camera blur c in view pixels.
+    step : float
+        Subsampling step S.
+    reference_blur : float
+        Blur c_ref of the reference in reference pixels.
+
+    Returns
+    -------
+    float
+        Blur in view pixels.
+
+    Examples
+    --------
+    >>> effective_blur(0.4, 10.0, 3.0)
+    0.5
+    """
+    return math.hypot(blur, reference_blur / step)
+
+
+def _rotation(angle: float) -> tuple[float, float]:
+    """Cosine and sine, exact at multiples of a right angle."""
+    quarter_turns = angle / (math.pi / 2)
+    if quarter_turns == round(quarter_turns):
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarter_turns) % 4]
+    return math.cos(angle), math.sin(angle)
+
+
+def _centre(shape: tuple[int, int]) -> tuple[float, float]:
+    return (shape[0] - 1) / 2, (shape[1] - 1) / 2
+
+
+def _check_number(name: str, value: float, allowed: str, least: float = -math.inf) -> None:
+    try:
+        good = math.isfinite(value) and value >= least
+    except TypeError:
+        good = False
+    if not good:
+        raise InputError(f"{name} is {value!r}; give {allowed}")

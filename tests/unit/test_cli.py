@@ -1,0 +1,195 @@
+"""The command: what it writes, and one line for what it refuses."""
+
+import inspect
+import io
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from keystab import cli, memory, scale_space
+from keystab.camera import simulate_view
+from keystab.detection import detect_keypoints
+from keystab.extrema import bytes_of_search
+from keystab.pictures import read_picture, write_picture
+from keystab.tables import read_table
+
+
+@pytest.fixture
+def picture(tmp_path):
+    """A Gaussian blob of 3 px seen with a camera blur of 0.8, off centre."""
+    y, x = np.mgrid[:40, :50]
+    write_picture(
+        np.exp(-0.5 * ((y - 18.0) ** 2 + (x - 24.5) ** 2) / (9 + 0.64)), tmp_path / "blob.npy"
+    )
+    return tmp_path / "blob.npy"
+
+
+def test_detect_finds_the_blob(picture, capsys):
+    assert cli.main(["detect", str(picture), "--camera-blur", "0.8", "--n-oct", "2"]) == 0
+    out, err = capsys.readouterr()
+    found = pd.read_csv(io.StringIO(out))
+    best = found.loc[found["value"].idxmin()]
+    # closed form: the DoG has its minimum at the centre, at s / sqrt(kappa)
+    assert [best["y"], best["x"]] == pytest.approx([18.0, 24.5], abs=0.01)
+    assert best["sigma"] == pytest.approx(3 / 2 ** (1 / 6), rel=0.02)
+    assert f"{len(found)} keypoints" in err
+
+
+def test_detect_passes_every_parameter(picture, tmp_path):
+    changed = {
+        "camera_blur": 0.7,
+        "n_spo": 4,
+        "delta_min": 0.4,
+        "sigma_min": 0.9,
+        "kappa": 1.3,
+        "oversampling": "cosine",
+        "epsilon": 1e-7,
+        "refine": False,
+        "max_offset": math.inf,
+        "max_iterations": 3.0,
+        "scale_moves": False,
+        "move": "unit_step",
+        "n_oct": 2,
+        "threads": 2,
+    }
+    parameters = inspect.signature(detect_keypoints).parameters
+    assert list(parameters)[1:] == list(changed)  # every parameter has a flag
+    defaults = cli._parser().parse_args(["detect", "x.png", "--camera-blur", "1"])
+    for name, parameter in list(parameters.items())[2:]:
+        assert getattr(defaults, name) == parameter.default, name
+    flags = []
+    for name, value in changed.items():
+        flag = "--" + name.replace("_", "-")
+        flags += [flag.replace("--", "--no-")] if value is False else [flag, str(value)]
+    out = tmp_path / "found.parquet"
+    assert cli.main(["detect", str(picture), "-o", str(out), *flags]) == 0
+    expected = detect_keypoints(read_picture(picture), **changed)
+    assert len(expected) > 0
+    pd.testing.assert_frame_equal(read_table(out), expected)
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".tiff", ".png"])
+def test_simulate_takes_the_view(picture, tmp_path, suffix, capsys):
+    out = tmp_path / f"view{suffix}"
+    arguments = "--blur 0.9 --step 2.5 --shape 9 12 --shift -0.5 1 --rotation 90 --noise 0.01"
+    assert cli.main(["simulate", str(picture), str(out), *arguments.split(), "--seed", "7"]) == 0
+    expected = simulate_view(
+        read_picture(picture), 0.9, 2.5, (9, 12), (-0.5, 1.0), math.pi / 2, 0.01, 7
+    )
+    if suffix == ".png":
+        clipped = int((expected < 0).sum())
+        assert clipped and f"{clipped} pixels clipped" in capsys.readouterr().err
+        expected = np.clip(expected, 0, 1)
+    tolerance = {".npy": 0.0, ".tiff": 1e-7, ".png": 0.5 / 65535}[suffix]
+    np.testing.assert_allclose(read_picture(out), expected, rtol=0, atol=tolerance)
+
+
+def test_simulate_sees_all_of_the_picture_by_default(picture, tmp_path):
+    out = tmp_path / "view.npy"
+    assert cli.main(["simulate", str(picture), str(out), "--blur", "1", "--step", "3"]) == 0
+    assert read_picture(out).shape == (13, 16)
+
+
+def test_seeds_may_be_words(picture, tmp_path):
+    for seed in ("seven", "7"):
+        out = str(tmp_path / f"{seed}.npy")
+        arguments = ["--blur", "1", "--step", "3", "--noise", "0.1", "--seed", seed]
+        assert cli.main(["simulate", str(picture), out, *arguments]) == 0
+    assert not np.array_equal(
+        read_picture(tmp_path / "7.npy"), read_picture(tmp_path / "seven.npy")
+    )
+
+
+BLUR = "--camera-blur 0.8"
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("", "required: COMMAND"),
+        ("frobnicate", "invalid choice: 'frobnicate'"),
+        ("detect PICTURE", "--camera-blur"),
+        ("detect PICTURE --camera-blur wide", "invalid float value: 'wide'"),
+        (f"detect PICTURE {BLUR} --move far", "invalid choice: 'far'"),
+        (f"detect gone.png {BLUR}", "gone.png: no such file"),
+        (f"detect PICTURE {BLUR} -o found.txt", "found.txt: a table ends in"),
+        (f"detect PICTURE {BLUR} --n-spo 0", "n_spo is 0"),
+        (f"detect PICTURE {BLUR} --n-oct 0", "n_oct is 0"),
+        (f"detect PICTURE {BLUR} --n-oct 40", "fewer octaves"),
+        (f"detect PICTURE {BLUR} --threads 0", "threads is 0"),
+        (f"detect PICTURE {BLUR} --delta-min 0", "delta_min is 0"),
+        (f"detect PICTURE {BLUR} --delta-min 1e-12", "larger delta_min"),
+        (f"detect PICTURE {BLUR} --kappa 1", "kappa is 1"),
+        (f"detect PICTURE {BLUR} --epsilon -1", "epsilon is -1"),
+        (f"detect PICTURE {BLUR} --max-offset 0", "max_offset is 0"),
+        (f"detect PICTURE {BLUR} --max-iterations nan", "max_iterations is nan"),
+        ("detect PICTURE --camera-blur 1.2", "sigma_min is 1.1"),
+        ("detect PICTURE --camera-blur nan", "camera_blur is nan"),
+        ("simulate PICTURE view.jpg --blur 1 --step 2", "cannot write '.jpg'"),
+        ("simulate gone.png view.png --blur 1 --step 2", "gone.png: no such file"),
+        ("simulate PICTURE view.png --blur -1 --step 2", "camera blur is -1"),
+        ("simulate PICTURE view.png --blur 1 --step 0", "step is 0"),
+        ("simulate PICTURE view.png --blur 1 --step 1000", "smaller step or a shape"),
+        ("simulate PICTURE view.png --blur 1 --step 2 --shape 0 4", "shape is (0, 4)"),
+        ("simulate PICTURE view.png --blur 1 --step 2 --noise 0.1", "seed"),
+        ("simulate PICTURE PICTURE/view.png --blur 1 --step 2", "blob.npy"),
+        ("inspect gone", "gone: no such file"),
+        ("inspect PICTURE", "ends in .csv or .parquet"),
+        ("inspect .", "no store of keystab here"),
+    ],
+)
+def test_bad_input_gets_status_2_and_one_line(
+    picture, tmp_path, monkeypatch, capsys, command, words
+):
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = cli.main(command.replace("PICTURE", str(picture)).split())
+    except SystemExit as end:  # argparse
+        status = end.code
+    out, err = capsys.readouterr()
+    assert status == 2 and out == ""
+    assert words in err
+    assert err.endswith("\n") and err.count("\n") == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["blob.npy"]
+
+
+def test_too_large_for_memory_is_refused_beforehand(picture, monkeypatch, capsys):
+    monkeypatch.setattr(memory, "available", lambda: 100_000)
+    assert cli.main(["detect", str(picture), "--camera-blur", "0.8"]) == 2
+    assert "needs about" in capsys.readouterr().err
+
+
+def test_memory_estimate_bounds_what_is_taken(picture):
+    import tracemalloc
+
+    image = np.tile(read_picture(picture), (3, 4))
+    detect_keypoints(image[:30, :30], 0.8)  # what is made once does not count
+    tracemalloc.start()
+    try:
+        detect_keypoints(image, 0.8)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert 0.2 < peak / bytes_of_search(scale_space(image, 0.8)) < 1
+
+
+def test_help_and_version_need_nothing_heavy():
+    code = (
+        "import sys\n"
+        "from keystab import cli\n"
+        "try:\n    cli.main(['detect', '--help'])\n"
+        "except SystemExit as end:\n    assert end.code == 0\n"
+        "assert not {'numpy', 'pandas', 'zarr'} & set(sys.modules)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "--max-offset" in run.stdout
+
+
+def test_a_reader_that_stops_early_is_no_error(picture):
+    command = f"{sys.executable} -m keystab.cli detect {picture} --camera-blur 0.8 | true"
+    run = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
+    assert "Traceback" not in run.stderr and "BrokenPipe" not in run.stderr

@@ -1,0 +1,91 @@
+"""Settings that are well-formed but cannot work are refused before anything runs."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from keystab import feasibility, settings
+from keystab.errors import InputError
+from keystab.pictures import write_picture
+from keystab.view_sets import per_view, view_shape, view_specs
+
+ROOT = Path(__file__).parents[2]
+SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+DEFAULTS = settings.completed({}, SCHEMA)
+
+
+def changed(*changes: tuple[str, object]) -> dict:
+    config = copy.deepcopy(DEFAULTS)
+    for place, value in changes:
+        *blocks, key = place.split(".")
+        block = config
+        for name in blocks:
+            block = block[name]
+        block[key] = value
+    return config
+
+
+@pytest.mark.parametrize("path", ["config.yaml", "quick.yaml"])
+def test_shipped_settings_are_feasible(path):
+    given = settings.read_yaml(ROOT / "config/config.yaml", ROOT / "config" / path)
+    feasibility.require(settings.checked(given, SCHEMA), ROOT)
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ([("detector.sigma_min", 1.0)], "detector.sigma_min is 1.0, allowed is at least 1.1"),
+        ([("reference_blur", 5.0)], "detector.sigma_min is 1.1, allowed is at least 1.2083"),
+        ([("sets.still.blur", [1.0, 1.1])], "sets.still has several views"),
+        ([("sets.examples.step", [20, 14])], "sets.examples has lists of different lengths (blur 3, step 2)"),
+        ([("comparison.unstable_below", 0.9)], "comparison.unstable_below is 0.9, allowed is a number below comparison.stable_above = 0.8"),
+        ([("semigroup.sigma_to", 0.05)], "semigroup.sigma_from is 0.1, allowed is a number below semigroup.sigma_to = 0.05"),
+        ([("keep_scale_spaces", [3, 40])], "keep_scale_spaces has 40, allowed are members of samplings.n_spo = [3, 4,"),
+        ([("figures", "empty")], "results, figures and logs name the same folder"),
+        ([("reference", "nowhere.png")], "reference: "),
+        ([("reference", "config/config.yaml")], "reference: "),
+        ([("sets.still.step", 500)], "sets.still asks for views of 4 x 8 px, allowed is a height of at least 9 px"),
+        ([("sets.examples.height", 113)], "sets.examples.height is 113, allowed is at most 112: the reference has 2250 px, the step is 20"),
+        ([("sets.still.step", 0.01), ("keep_scale_spaces", False)], "delta_min = "),
+        ([("sets.still.step", 1), ("keep_scale_spaces", True)], "keep_scale_spaces asks for 1.53 TB of stores"),
+    ],
+)  # fmt: skip
+def test_contradictions_get_one_line(changes, line, monkeypatch):
+    monkeypatch.setattr(feasibility, "_free_bytes", lambda folder: int(1e12))
+    with pytest.raises(InputError) as caught:
+        feasibility.require(changed(("results", "empty"), *changes), ROOT)
+    (said,) = str(caught.value).splitlines()
+    assert said.startswith(f"config: {line}")
+
+
+def test_stores_that_exist_need_no_more_room(tmp_path, monkeypatch):
+    monkeypatch.setattr(feasibility, "_free_bytes", lambda folder: 0)
+    config = changed(("results", str(tmp_path)), ("keep_scale_spaces", [3]))
+    assert feasibility.picture_problems(config, ROOT)
+    (tmp_path / "scale_space").mkdir()
+    (tmp_path / "scale_space" / "n3.sha256").touch()
+    assert not feasibility.picture_problems(config, ROOT)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".npy"])
+def test_shape_is_read_from_the_head_of_a_picture(tmp_path, suffix):
+    path = tmp_path / f"picture{suffix}"
+    write_picture(np.linspace(0, 1, 6 * 9).reshape(6, 9), path)
+    assert feasibility.picture_shape(path) == (6, 9)
+
+
+def test_views_of_a_set():
+    rest = {"shift_y": 0.0, "shift_x": [0.0, 0.25], "rotation": 0.0, "noise": 0.0}
+    views = {"blur": 1.1, "step": [10.0, 12.0], "height": None, "width": 30, **rest}
+    assert per_view(views)["blur"] == [1.1, 1.1]
+    assert view_shape(views, (250, 400)) == (20, 30)  # the largest step decides
+    first, second = view_specs("some", views, (250, 400))
+    assert (first.step, first.shift, first.shape) == (10.0, (0.0, 0.0), (20, 30))
+    assert (second.step, second.shift, second.seed) == (12.0, (0.0, 0.25), ("some", 1))
+    with pytest.raises(InputError, match="different lengths"):
+        per_view({**views, "noise": [0.0, 0.1, 0.2]})

@@ -1,0 +1,259 @@
+"""Each figure draws the numbers of its tables, and says which numbers it cannot draw."""
+
+import figure_tables
+import numpy as np
+import pandas as pd
+import pytest
+from figure_tables import GRID, drawn
+from matplotlib.colors import to_rgb
+from numpy.testing import assert_allclose, assert_array_equal
+
+from keystab.errors import InputError
+from keystab.figures import fig1, fig2, fig3, fig4, fig5, fig6, palette
+
+
+def panel(figure, name):
+    (ax,) = [ax for ax in figure.axes if ax.get_label() == name]
+    return ax
+
+
+def line(ax, label):
+    (found,) = [line for line in ax.get_lines() if line.get_label() == label]
+    return np.asarray(found.get_xdata(), float), np.asarray(found.get_ydata(), float)
+
+
+def test_figure_1_draws_blurs_errors_and_residuals():
+    tables, figure = drawn(1)
+    for method, name in fig1.PANELS.items():
+        rows = tables["fig1"].query("method == @method")
+        for column in ("repeated_blur", "single_blur", "theory"):
+            sigma, added = line(panel(figure, name), column)
+            assert_array_equal(sigma, rows["sigma"])
+            assert_allclose(added**2 + 1.1**2, np.maximum(rows[column] ** 2, 1.1**2))
+        assert_array_equal(line(panel(figure, "e"), method)[1], rows["residual"])
+        error = abs(rows["repeated_blur"] / rows["theory"] - 1)
+        assert_array_equal(line(panel(figure, "d"), method)[1], error)
+    assert_allclose(line(panel(figure, "b"), "theory")[1], np.sqrt(10) * rows["sigma"])
+
+
+def test_figure_1_names_a_missing_method():
+    table = figure_tables.fig1()["fig1"]
+    with pytest.raises(InputError, match="no rows of the method dct"):
+        fig1.draw({"fig1": table[table["method"] != "dct"]})
+
+
+def test_figure_2_shows_the_pixels_and_one_detail_of_the_scene():
+    tables, figure = drawn(2)
+    scene = []
+    for k, view in tables["fig2"].iterrows():
+        whole, detail = panel(figure, "abc"[k]), panel(figure, f"detail {k}")
+        pixels = tables["fig2_pixels"].query("view == @k").sort_values(["y", "x"])["value"]
+        shape = (view["height"], view["width"])
+        assert_array_equal(whole.images[0].get_array(), pixels.to_numpy().reshape(shape))
+        assert_array_equal(detail.images[0].get_array(), whole.images[0].get_array())
+        assert (whole.images[0].norm.vmin, whole.images[0].norm.vmax) == (0.0, 1.0)
+        (left, right), (bottom, top) = detail.get_xlim(), detail.get_ylim()
+        assert -0.5 <= left < right <= shape[1] - 0.5 and -0.5 <= top < bottom <= shape[0] - 0.5
+        middle = (np.array([shape[1], shape[1], shape[0], shape[0]]) - 1) / 2
+        scene.append((np.array([left, right, top, bottom]) - middle) * view["step"])
+        assert f"$c$ = {view['blur']}" in whole.get_title(loc="left")
+    assert_allclose(scene, [scene[0]] * 3)
+
+
+def test_figure_2_refuses_missing_and_repeated_pixels():
+    tables = figure_tables.fig2()
+    pixels = tables["fig2_pixels"]
+    repeated = pd.concat([pixels.iloc[1:], pixels.iloc[1:2]])
+    for wrong in (pixels.iloc[1:], repeated, pixels.assign(y=pixels["y"] + 1)):
+        with pytest.raises(InputError, match="view 0 needs 113 x 200 pixels"):
+            fig2.draw(tables | {"fig2_pixels": wrong})
+
+
+def test_figure_3_draws_the_grid_on_one_scale_and_the_curve():
+    tables, figure = drawn(3)
+    table = tables["fig3"]
+    shared = table[table.groupby("delta_min")["n_spo"].transform("nunique") > 1]
+    maps = {column: name for column, (name, _) in fig3.COUNTS.items()}
+    scales = set()
+    for column, name in (maps | {"median_condition": "d"}).items():
+        (mesh,) = panel(figure, name).collections
+        expected = shared.pivot(index="delta_min", columns="n_spo", values=column)
+        assert_array_equal(np.asarray(mesh.get_array()), expected)
+        written = [text.get_text() for text in panel(figure, name).texts]
+        assert len(written) == expected.size
+        scales.add((mesh.norm.vmin, mesh.norm.vmax) if name in "abc" else None)
+        assert name in "abc" or type(mesh.norm).__name__ == "LogNorm"
+    assert scales == {(table["n_unique"].min(), shared["n_extrema"].max()), None}
+    curve = table[table["balanced"]]
+    assert_array_equal(line(panel(figure, "e"), "balanced"), curve[["n_spo", "delta_min"]].T)
+    conditions = line(panel(figure, "e condition"), "median_condition")
+    assert_array_equal(conditions, curve[["n_spo", "median_condition"]].T)
+
+
+def test_figure_3_outlines_sift_and_follows_the_balanced_cells():
+    ax = panel(drawn(3)[1], "b")
+    (outline,) = [patch for patch in ax.patches if patch.get_label() == "SIFT"]
+    # n_spo = 3 is the first column; 1/2 is the largest step, so the top row.
+    assert outline.get_xy() == pytest.approx((0.0, len(GRID) - 1))
+    x, y = line(ax, "balanced")
+    # The steps of the grid are the balanced ones of its n_spo: the curve is its diagonal.
+    assert_allclose(x + y, len(GRID), atol=1e-9)
+    assert ((abs(x % 1 - 0.5) > 0.3) | (abs(y % 1 - 0.5) > 0.2)).all()  # off the numbers
+
+
+def test_figure_3_needs_a_grid_and_a_curve():
+    table = figure_tables.fig3()["fig3"]
+    with pytest.raises(InputError, match="no row is marked balanced"):
+        fig3.draw({"fig3": table.assign(balanced=False)})
+    with pytest.raises(InputError, match="there is no grid"):
+        fig3.draw({"fig3": table[table["balanced"]]})
+
+
+def test_figure_4_draws_counts_and_rates():
+    tables, figure = drawn(4)
+    counts = tables["fig4_counts"]
+    for column in ("n_extrema", "n_common"):
+        assert_array_equal(line(panel(figure, "a"), column), counts[["n_spo", column]].T)
+    for change in ("new", "lost"):
+        n_spo, rate = line(panel(figure, "b"), change)
+        assert_array_equal(rate, 100 * counts[f"{change}_rate"])
+        assert np.isnan(rate).sum() == 1
+    assert len(panel(figure, "b").collections) == 2  # the two bands
+
+
+def test_figure_4_orders_and_colours_columns_by_stability():
+    tables, figure = drawn(4)
+    detected = tables["fig4_occurrence"].pivot(index="n_spo", columns="keypoint", values="detected")
+    first = panel(figure, "c").images[0].get_array()
+    assert_array_equal(np.ma.filled(first, 0.0), detected)
+    second = panel(figure, "d").images[0].get_array()
+    stability = second.max(axis=0)
+    assert (np.diff(stability) >= 0).all()
+    assert_array_equal((~np.ma.getmaskarray(second)).sum(axis=0), np.round(17 * stability))
+    assert_array_equal(np.sort(tables["fig4_keypoints"]["stability"]), stability)
+    ends, _ = line(panel(figure, "d"), "stable")
+    assert ends[1] - ends[0] == (stability > 0.8).sum()
+
+
+def test_figure_4_refuses_an_occurrence_matrix_with_holes():
+    tables = figure_tables.fig4()
+    with pytest.raises(InputError, match="lacks some pairs"):
+        fig4.draw(tables | {"fig4_occurrence": tables["fig4_occurrence"].iloc[1:]})
+
+
+def test_figure_4_says_the_shares_of_the_summary():
+    tables, figure = drawn(4)
+    share = tables["fig4_summary"].set_index("quantity")["value"].mul(100).round()
+    low, high = (text.get_text() for text in panel(figure, "d").texts)
+    assert low == f"at less than 20 % of the samplings: {share['share_unstable']:.0f} %"
+    assert high.startswith(f"at more than 80 % of the samplings: {share['share_stable']:.0f} %")
+    assert high.endswith(f"at all of them: {share['share_always']:.0f} %")
+    with pytest.raises(InputError, match="lacks the quantity share_always"):
+        fig4.draw(
+            tables | {"fig4_summary": tables["fig4_summary"].query("quantity != 'share_always'")}
+        )
+
+
+def test_figure_5_draws_shares_and_roc():
+    tables, figure = drawn(5)
+    for feature, (name, _) in fig5.PANELS.items():
+        rows = tables["fig5_thresholds"].query("feature == @feature")
+        for group in ("stable", "unstable"):
+            threshold, share = line(panel(figure, name), group)
+            assert_array_equal(threshold, rows["threshold"])
+            assert_array_equal(share, 100 * rows[f"{group}_below"])
+        curve = np.array(line(panel(figure, "e"), feature))
+        rows = tables["fig5_roc"].query("feature == @feature")
+        expected = rows[["specificity", "sensitivity"]].to_numpy().T
+        order = np.lexsort((-expected[1], expected[0]))
+        assert_array_equal(curve, expected[:, order])
+    assert_array_equal(line(panel(figure, "e"), "chance"), [[0, 1], [1, 0]])
+
+
+def test_figure_5_lists_the_areas_best_first():
+    tables, figure = drawn(5)
+    texts = panel(figure, "areas").texts[1:]
+    areas = [float(text.get_text()[:4]) for text in texts]
+    assert areas == sorted(areas, reverse=True)
+    assert_allclose(areas, np.sort(tables["fig5_auc"]["auc"])[::-1], atol=0.005)
+    assert {text.get_color() for text in texts} == set(palette.FEATURE_COLOURS.values())
+
+
+def test_figure_5_names_a_missing_feature():
+    tables = figure_tables.fig5()
+    roc = tables["fig5_roc"].query("feature != 'laplacian'")
+    with pytest.raises(InputError, match=r"^fig5_roc.csv: has no rows of the feature laplacian"):
+        fig5.draw(tables | {"fig5_roc": roc})
+
+
+def volume(surface):
+    """Return six times the signed volume: positive when the faces look outwards."""
+    corner = surface.corners[surface.faces]
+    return float(np.einsum("ij,ij->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_surface_of_an_ellipsoid_encloses_its_volume(sign):
+    s, y, x = np.meshgrid(*[np.arange(-12.0, 13.0)] * 3, indexing="ij")
+    cube = sign * np.exp(-0.5 * ((s / 4) ** 2 + (y / 6) ** 2 + (x / 8) ** 2))
+    own, others = fig6.iso_surfaces(cube, sign * np.exp(-0.5))  # semi-axes 4, 6 and 8
+    assert others is None
+    # The chords of a unit grid cut 2 % off a body of this size.
+    assert volume(own) == pytest.approx(4 / 3 * np.pi * 4 * 6 * 8, rel=0.03)
+    assert_allclose(np.abs(own.corners).max(axis=0), [8, 6, 4], atol=0.05)
+
+
+def test_a_surface_that_leaves_the_cube_is_closed_by_its_sides():
+    s, y, x = np.meshgrid(*[np.arange(-5.0, 6.0)] * 3, indexing="ij")
+    own, _ = fig6.iso_surfaces(np.exp(-0.5 * (s**2 + y**2) / 4) + 0 * x, np.exp(-0.5))
+    sides = np.sort(own.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, uses = np.unique(sides, axis=0, return_counts=True)
+    assert (uses == 2).all()  # every edge has a triangle on both sides
+    assert volume(own) == pytest.approx(np.pi * 4 * 10, rel=0.06)  # radius 2, length 10
+
+
+def test_parts_that_do_not_hold_the_keypoint_are_kept_apart():
+    s, y, x = np.meshgrid(*[np.arange(-12.0, 13.0)] * 3, indexing="ij")
+
+    def bump(x0, width):
+        return np.exp(-0.5 * (s**2 + y**2 + (x - x0) ** 2) / width**2)
+
+    own, others = fig6.iso_surfaces(bump(0, 2) + bump(8, 1.5), 0.5)
+    assert own.corners[:, 0].max() < 4 < others.corners[:, 0].min()
+    assert volume(others) > 0
+
+
+def test_figure_6_draws_a_coloured_surface_per_keypoint_from_one_view():
+    tables, figure = drawn(6)
+    assert len(figure.axes) == 4
+    assert {(ax.elev, ax.azim) for ax in figure.axes} == {tuple(fig6.VIEW.values())}
+    assert [line.get_label() for line in figure.axes[0].get_lines()][-3:] == [
+        "$x$",
+        "$y$",
+        r"$\sigma$",
+    ]
+    for row in tables["fig6"].to_dict("records"):
+        ax = panel(figure, f"panel {row['panel']}")
+        (surface,) = ax.collections
+        hue = np.array(to_rgb(palette.SURFACE_COLOURS[row["group"]]))
+        shades = surface.get_facecolor()[:, :3] / hue
+        own = np.ptp(shades, axis=1) < 1e-9  # the group's colour, darkened
+        cube = tables["fig6_cubes"].query("panel == @row['panel']")["value"].to_numpy()
+        expected, _ = fig6.iso_surfaces(cube.reshape(11, 11, 11), row["level"])
+        assert own.sum() == len(expected.faces)
+        assert surface.get_rasterized()
+        assert ax.get_title().startswith(f"{100 * row['stability']:.0f} %")
+
+
+def test_figure_6_names_what_is_wrong_with_a_cube():
+    tables = figure_tables.fig6(per_group=1, half=3)
+    cubes, panels = tables["fig6_cubes"], tables["fig6"]
+    with pytest.raises(InputError, match="panel 0 needs 7\\^3 finite values"):
+        fig6.draw(tables | {"fig6_cubes": cubes.drop(index=5)})
+    with pytest.raises(InputError, match="no cube for panel 1"):
+        fig6.draw(tables | {"fig6_cubes": cubes.query("panel == 0")})
+    with pytest.raises(InputError, match="the group unstable is empty"):
+        fig6.draw(tables | {"fig6": panels.query("group == 'stable'")})
+    centre = cubes.query("panel == 0 and k_s == 0 and k_y == 0 and k_x == 0")["value"].item()
+    with pytest.raises(InputError, match="is the value of the keypoint"):
+        fig6.draw(tables | {"fig6": panels.assign(level=centre)})

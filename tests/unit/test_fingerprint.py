@@ -1,0 +1,123 @@
+"""The fingerprint sees every edit of code, however far away, and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from keystab import fingerprint as room
+
+FILES = {
+    "__init__.py": '"""Names."""\n__version__ = "1"\n',
+    "base.py": '"""Base."""\n\ndef double(x):\n    """Twice."""\n    return 2 * x  # twice\n',
+    "late.py": "LIMIT = 3\n",
+    "alone.py": "VALUE = 1\n",
+    "types_only.py": "class Thing: ...\n",
+    "stages/__init__.py": '"""Stages."""\n',
+    "stages/work.py": (
+        "from __future__ import annotations\n"
+        "from typing import TYPE_CHECKING\n"
+        "import os\n"
+        "from toy.base import double\n"
+        "if TYPE_CHECKING:\n"
+        "    from toy.types_only import Thing\n"
+        "def main():\n"
+        "    try:\n"
+        "        from toy import late\n"
+        "    finally:\n"
+        "        pass\n"
+        "    return double(late.LIMIT)\n"
+    ),
+    "stages/near.py": "from ..base import double\nfrom . import work\n",
+}
+
+
+@pytest.fixture
+def toy(tmp_path: Path) -> Path:
+    folder = tmp_path / "toy"
+    for name, text in FILES.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
+def taken(folder: Path, module: str = "toy.stages.work") -> str:
+    room._read.cache_clear()
+    return room.fingerprint(module, folder)
+
+
+def test_closure_follows_nested_and_relative_imports(toy):
+    modules = room.imported_modules("toy.stages.near", toy)
+    assert modules == ["toy.base", "toy.late", "toy.stages", "toy.stages.near", "toy.stages.work"]
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("stages/work.py", "return double", "return 1 + double"),
+        ("base.py", "2 * x", "3 * x"),  # imported
+        ("late.py", "LIMIT = 3", "LIMIT = 4"),  # imported inside a function
+        ("stages/__init__.py", '"""Stages."""', "import os"),  # runs before the stage
+    ],
+)
+def test_code_edits_change_it(toy, name, old, new):
+    before = taken(toy)
+    text = (toy / name).read_text()
+    assert old in text
+    (toy / name).write_text(text.replace(old, new))
+    assert taken(toy) != before
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("base.py", "# twice", "# two times"),
+        ("base.py", '"""Twice."""', '"""Two times what was given."""'),
+        ("base.py", '    """Twice."""\n', ""),
+        ("base.py", "2 * x", "(2  *  x)"),  # layout
+        ("base.py", '"""Base."""\n', '"""Base.\n\nMore words.\n"""\n\n\n'),
+        ("stages/__init__.py", '"""Stages."""\n', ""),
+        ("alone.py", "VALUE = 1", "VALUE = 2"),  # not imported
+        ("types_only.py", "class Thing: ...", "class Thing: x = 1"),  # never imported at run time
+        ("__init__.py", '"1"', '"2"'),  # the table of public names
+    ],
+)
+def test_other_edits_keep_it(toy, name, old, new):
+    before = taken(toy)
+    text = (toy / name).read_text()
+    assert old in text
+    (toy / name).write_text(text.replace(old, new))
+    assert taken(toy) == before
+
+
+def test_strings_that_are_no_docstrings_count(toy):
+    before = taken(toy)
+    (toy / "late.py").write_text('LIMIT = 3\n"""A string after the first statement."""\n')
+    assert taken(toy) != before
+
+
+@pytest.mark.parametrize(
+    "line", ["import toy", "from toy import nothing", "from toy.stages import nothing"]
+)
+def test_imports_that_cannot_be_followed_are_refused(toy, line):
+    (toy / "late.py").write_text(f"{line}\n")
+    with pytest.raises(ValueError, match=r"toy\.late"):
+        taken(toy)
+
+
+def test_name_taken_from_the_package_brings_its_code_in(toy):
+    (toy / "late.py").write_text("from toy import __version__\nLIMIT = 3\n")
+    before = taken(toy)
+    (toy / "__init__.py").write_text('__version__ = "2"\n')
+    assert taken(toy) != before
+
+
+def test_every_stage_and_figure_of_the_study_can_be_followed():
+    for folder in ("stages", "figures"):
+        for path in (room.PACKAGE_FOLDER / folder).glob("*.py"):
+            name = f"keystab.{folder}" + ("" if path.stem == "__init__" else f".{path.stem}")
+            assert name in room.imported_modules(name)
+    assert "keystab.extrema" in room.imported_modules("keystab.stages.detect")
+    assert "keystab.extrema" not in room.imported_modules("keystab.stages.simulate")
+    assert "keystab.detection" not in room.imported_modules("keystab.figures.fig1")

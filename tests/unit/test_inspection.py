@@ -1,0 +1,67 @@
+"""Stores and tables described in words."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from keystab import stores
+from keystab.camera import ViewSpec
+from keystab.dog_space import scale_space
+from keystab.errors import InputError
+from keystab.inspection import describe
+from keystab.seals import write_seal
+from keystab.tables import write_table
+
+IMAGE = np.random.default_rng(0).random((12, 16))
+
+
+def test_scale_space(tmp_path):
+    space = scale_space(IMAGE, camera_blur=0.5, n_spo=2, delta_min=0.5, sigma_min=1.0)
+    stores.write_scale_space(space, tmp_path / "n2")
+    text = describe(tmp_path / "n2")
+    assert "difference-of-Gaussians scale-space" in text
+    assert "4 slices, sigma 1 to 2.82843 pixels" in text
+    assert "24 x 32 samples a slice, one every 0.5 pixels" in text
+    assert "24.6 kB" in text
+    assert "camera_blur: 0.5" in text and "oversampling: spline" in text
+    assert text.endswith("no seal beside it; every chunk is there")
+    write_seal(tmp_path / "n2", tmp_path / "n2.sha256")
+    assert describe(tmp_path / "n2").endswith("all files agree with the seal beside it")
+    (tmp_path / "n2" / "data.zarr" / "extra").write_text("x")
+    with pytest.raises(InputError, match="extra was not there"):
+        describe(tmp_path / "n2")
+
+
+def test_views(tmp_path):
+    specs = [ViewSpec(blur, 10.0, (12, 16)) for blur in (0.5, 1.1)]
+    stores.write_views([IMAGE, IMAGE], specs, tmp_path, {"set": "examples"})
+    text = describe(tmp_path)
+    assert "2 simulated views of float32" in text
+    assert "camera blur 0.5 to 1.1 pixels" in text and "step 10 reference pixels" in text
+    assert "set: examples" in text
+
+
+def test_keypoints(tmp_path):
+    table = pd.DataFrame(
+        {
+            "y": [1.5, 2.5, 9.0],
+            "x": [4.0, np.nan, 3.0],
+            "sigma": [1.1, 1.2, 2.0],
+            "sign": [1, -1, 1],
+        }
+    )
+    write_table(table.assign(feature=["dog", "dog", "laplacian"]), tmp_path / "k.csv")
+    text = describe(tmp_path / "k.csv")
+    assert "table of 3 keypoints" in text and "2 maxima, 1 minima" in text
+    assert "  y: 1.5 to 9\n" in text and "  x: 3 to 4, 1 missing\n" in text
+    assert text.endswith("  feature: 2 values")
+
+
+def test_other_tables_and_groups(tmp_path):
+    write_table(pd.DataFrame({"auc": [0.5]}), tmp_path / "t.parquet")
+    assert "table of 1 row\n" in describe(tmp_path / "t.parquet")
+    import zarr
+
+    zarr.create_group(tmp_path / "other", zarr_format=3)
+    with pytest.raises(InputError, match="none that keystab wrote"):
+        describe(tmp_path / "other")

@@ -1,0 +1,164 @@
+"""Reading pictures: values, depths, colours, and what is refused."""
+
+import hashlib
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image
+
+from keystab.errors import InputError
+from keystab.pictures import pixel_digest, read_picture, write_picture
+
+LEVELS = np.array([[0, 51, 102], [153, 204, 255]], dtype=np.uint8)
+COLOUR = np.random.default_rng(0).integers(0, 256, (5, 4, 3), dtype=np.uint8)
+COLOUR_GREY = (0.299 * COLOUR[..., 0] + 0.587 * COLOUR[..., 1] + 0.114 * COLOUR[..., 2]) / 255
+
+
+@pytest.mark.parametrize(
+    ("name", "samples", "expected"),
+    [
+        ("grey8.png", LEVELS, LEVELS / 255),
+        ("grey16.png", LEVELS.astype(np.uint16) * 257, LEVELS / 255),
+        ("grey8.tif", LEVELS, LEVELS / 255),
+        ("grey16.tif", LEVELS.astype(np.uint16) * 257, LEVELS / 255),
+        ("grey32.tif", LEVELS.astype(np.uint32) * 16843009, LEVELS / 255),
+        ("single.tif", np.float32([[0.25, -1.5], [3.0, 0.5]]), [[0.25, -1.5], [3.0, 0.5]]),
+        ("colour.png", COLOUR, COLOUR_GREY),
+        ("colour.tif", COLOUR, COLOUR_GREY),
+        ("colour16.tif", COLOUR.astype(np.uint16) * 257, COLOUR_GREY),
+        ("array.npy", np.float64([[0.1, 0.7]]), [[0.1, 0.7]]),
+        ("array_colour.npy", COLOUR / 255, COLOUR_GREY),
+        ("switches.npy", np.array([[True, False]]), [[1.0, 0.0]]),
+    ],
+)
+def test_values_of_every_depth(tmp_path, name, samples, expected):
+    path = tmp_path / name
+    if path.suffix == ".npy":
+        np.save(path, samples)
+    elif path.suffix == ".tif":
+        kind = "rgb" if np.ndim(samples) == 3 else "minisblack"
+        tifffile.imwrite(path, samples, photometric=kind)
+    else:
+        iio.imwrite(path, samples)
+    u = read_picture(path)
+    assert u.dtype == np.float64
+    np.testing.assert_allclose(u, expected, rtol=0, atol=1e-15)
+
+
+def test_alpha_is_ignored(tmp_path):
+    alpha = np.arange(20, dtype=np.uint8).reshape(5, 4, 1)
+    iio.imwrite(tmp_path / "a.png", np.concatenate([COLOUR, alpha], axis=-1))
+    np.testing.assert_allclose(read_picture(tmp_path / "a.png"), COLOUR_GREY, rtol=0, atol=1e-15)
+    Image.fromarray(np.stack([LEVELS, LEVELS // 2], axis=-1), "LA").save(tmp_path / "la.png")
+    np.testing.assert_array_equal(read_picture(tmp_path / "la.png"), LEVELS / 255)
+
+
+@pytest.mark.parametrize("mode", ["P", "1", "CMYK"])
+def test_palettes_bits_and_inks_become_grey(tmp_path, mode):
+    black_and_white = Image.fromarray(np.uint8([[0, 255, 0], [255, 255, 0]])).convert("RGB")
+    path = tmp_path / ("picture.tif" if mode == "CMYK" else "picture.png")
+    black_and_white.convert(mode).save(path)
+    np.testing.assert_allclose(read_picture(path), [[0, 1, 0], [1, 1, 0]], rtol=0, atol=1e-15)
+
+
+def test_jpeg_is_read(tmp_path):
+    flat = np.full((16, 16), 128, dtype=np.uint8)
+    iio.imwrite(tmp_path / "flat.jpg", flat)
+    np.testing.assert_allclose(read_picture(tmp_path / "flat.jpg"), 128 / 255, rtol=0, atol=1 / 255)
+
+
+def test_tiff_varieties(tmp_path):
+    tifffile.imwrite(tmp_path / "white0.tif", LEVELS, photometric="miniswhite")
+    np.testing.assert_array_equal(read_picture(tmp_path / "white0.tif"), (255 - LEVELS) / 255)
+    tifffile.imwrite(
+        tmp_path / "planes.tif", np.moveaxis(COLOUR, -1, 0), photometric="rgb", planarconfig=2
+    )
+    np.testing.assert_allclose(
+        read_picture(tmp_path / "planes.tif"), COLOUR_GREY, rtol=0, atol=1e-15
+    )
+    Image.fromarray(COLOUR).save(tmp_path / "lzw.tif", compression="tiff_lzw")
+    np.testing.assert_allclose(read_picture(tmp_path / "lzw.tif"), COLOUR_GREY, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "tolerance"), [(".png", 0.5 / 65535), (".tiff", 1e-7), (".npy", 0.0)]
+)
+def test_round_trip(tmp_path, suffix, tolerance):
+    u = np.random.default_rng(1).random((6, 9))
+    path = tmp_path / "new folder" / f"u{suffix}"
+    write_picture(u, path)
+    np.testing.assert_allclose(read_picture(path), u, rtol=0, atol=tolerance)
+    assert [p.name for p in path.parent.iterdir()] == [path.name]  # no temporary file stays
+
+
+def test_png_clips(tmp_path):
+    write_picture(np.array([[-0.3, 1.7]]), tmp_path / "u.png")
+    np.testing.assert_array_equal(read_picture(tmp_path / "u.png"), [[0.0, 1.0]])
+
+
+def test_digest_is_that_of_the_pixel_bytes(tmp_path):
+    expected = hashlib.sha256(bytes([0, 51, 102, 153, 204, 255])).hexdigest()
+    iio.imwrite(tmp_path / "a.png", LEVELS)
+    tifffile.imwrite(tmp_path / "b.tif", LEVELS)
+    assert pixel_digest(tmp_path / "a.png") == pixel_digest(tmp_path / "b.tif") == expected
+    words = np.array([[1, 258]], dtype=np.uint16)
+    tifffile.imwrite(tmp_path / "big.tif", words, byteorder=">")
+    little = hashlib.sha256(bytes([1, 0, 2, 1])).hexdigest()
+    assert pixel_digest(tmp_path / "big.tif") == little
+
+
+def refuse_16_bit_colour(path):
+    """A PNG header that promises colour at 16 bits; the decoder never gets to see it."""
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + bytes([0, 0, 0, 13])
+        + b"IHDR"
+        + bytes([0, 0, 0, 1, 0, 0, 0, 1, 16, 2, 0, 0, 0])
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "make", "words"),
+    [
+        ("gone.png", lambda p: None, "no such file"),
+        ("folder.png", lambda p: p.mkdir(), "cannot be opened"),
+        ("text.png", lambda p: p.write_text("hello"), "not a readable picture"),
+        ("empty.png", lambda p: p.write_bytes(b""), "not a readable picture"),
+        ("cut.png", lambda p: cut(p), "not a readable picture"),
+        ("cut.tif", lambda p: p.write_bytes(b"II*\0\x08\0"), "not a readable picture"),
+        ("deep.png", refuse_16_bit_colour, "16 bits per channel"),
+        ("nan.npy", lambda p: np.save(p, np.array([[0.0, np.nan], [np.inf, 1]])), "2 of 4 pixels"),
+        ("signed.npy", lambda p: np.save(p, np.zeros((2, 2), dtype=np.int16)), "int16"),
+        ("none.npy", lambda p: np.save(p, np.zeros((0, 5))), "no pixels"),
+        ("line.npy", lambda p: np.save(p, np.zeros(5)), "shape (5,)"),
+        ("bands.npy", lambda p: np.save(p, np.zeros((5, 5, 7))), "shape (5, 5, 7)"),
+        ("objects.npy", lambda p: np.save(p, np.array([[None]]), allow_pickle=True), "not a"),
+        (
+            "pages.tif",
+            lambda p: tifffile.imwrite(p, np.zeros((3, 8, 8), np.uint8), photometric="minisblack"),
+            "3 pictures",
+        ),
+    ],
+)
+def test_what_cannot_be_read_gets_one_line(tmp_path, name, make, words):
+    path = tmp_path / name
+    make(path)
+    with pytest.raises(InputError) as raised:
+        read_picture(path)
+    message = str(raised.value)
+    assert message.startswith(str(path))
+    assert words in message
+    assert "\n" not in message
+
+
+def cut(path):
+    iio.imwrite(path, np.random.default_rng(0).integers(0, 255, (64, 64), dtype=np.uint8))
+    path.write_bytes(path.read_bytes()[:2000])
+
+
+def test_unknown_suffix_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"cannot write '\.bmp'"):
+        write_picture(np.zeros((2, 2)), tmp_path / "u.bmp")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,72 @@
+"""A change reruns what depends on it and nothing else."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+from project import QUICK
+
+FIGURES = {f"fig{n}" for n in range(1, 7)}
+AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
+MATCHING = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
+DETECTION = {"detect", "detect_stored", "detect_grid", "count_refined"} | MATCHING
+STILL = {"simulate", "scale_space"} | DETECTION
+EVERYTHING = STILL | FIGURES | {"semigroup", "describe_views"}
+
+
+def reruns(project) -> set[str]:
+    return project.would_run(*QUICK).keys() - {"all"}
+
+
+def test_nothing_to_do_when_finished_copied_and_touched(finished):
+    now = time.time()
+    for path in finished.folder.rglob("*"):
+        if ".snakemake" not in path.parts and path.is_file():
+            os.utime(path, (now, now))
+    assert reruns(finished) == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "expected"),
+    [
+        ("src/keystab/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
+        ("src/keystab/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
+        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION),
+        ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
+        ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
+        ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"simulate", "describe_views", "fig2", "cut_cubes"} | STILL),
+        ("workflow/report/fig3.rst", "", "A better caption. ", set()),
+        ("environment.lock", "numpy==", "# another numpy\nnumpy==", EVERYTHING),
+    ],
+)  # fmt: skip
+def test_edits_of_code(finished, name, old, new, expected):
+    if name.endswith("style.py"):  # the future import must stay first
+        old, new = (
+            "from __future__ import annotations",
+            "from __future__ import annotations\nMORE = 1",
+        )
+    finished.edit(name, old, new)
+    assert reruns(finished) == expected
+
+
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        ("refinement: {max_offset: 0.7}", {"count_refined"}),
+        ("refinement: {move: unit_step}", {"detect", "detect_stored", "count_refined"} | MATCHING),
+        ("comparison: {match_sign: true}", MATCHING),
+        ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
+        ("cubes: {count: 5}", {"cut_cubes", "fig6"}),
+        ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
+        ("draft: false", FIGURES),
+        # 1.1 is also the blur and 0.0 also the shift: the set of values stays the same.
+        ("sets: {still: {noise: 1.1, step: 20}}", STILL),
+        ("sets: {examples: {rotation: 112}}", {"simulate", "describe_views", "fig2"}),
+    ],
+)  # fmt: skip
+def test_changes_of_settings(finished, setting, expected):
+    (finished.folder / "config/change.yaml").write_text(setting + "\n")
+    jobs = finished.would_run(*QUICK, "config/change.yaml")
+    assert jobs.keys() - {"all"} == expected

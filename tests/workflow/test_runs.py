@@ -1,0 +1,65 @@
+"""Small parts of the study, run for real; and what a person sees who mistypes something."""
+
+from __future__ import annotations
+
+import pytest
+
+TINY = """
+sets: {still: {step: 40}, examples: {step: [40, 28, 20], height: 56, width: 100}}
+samplings: {n_spo: [3, 4]}
+keep_scale_spaces: KEEP
+reference_sha256: SHA
+results: results/tiny
+figures: figures/tiny
+logs: logs/tiny
+"""
+SHA = "d5f714f453d58bdda7b7575dac5d19d32994ff482217e19e58f74d0b63e2dd30"
+
+
+def tiny(project, keep: str = "false", sha: str = SHA) -> tuple[str, str]:
+    text = TINY.replace("KEEP", keep).replace("SHA", sha)
+    (project.folder / "config/tiny.yaml").write_text(text)
+    return ("--configfile", "config/tiny.yaml")
+
+
+def test_detections_of_a_stored_scale_space(project):
+    target = "results/tiny/keypoints/sampling_n3.parquet"
+    run = project.snakemake(*tiny(project, "[3]"), "--", target)
+    assert run.returncode == 0, run.stdout
+    store = project.folder / "results/tiny/scale_space/n3"
+    assert (store / "data.zarr/zarr.json").is_file()
+    assert "data.zarr/zarr.json" in store.with_suffix(".sha256").read_text()
+    assert "extrema among" in (project.folder / "logs/tiny/detect/n3.log").read_text()
+    assert "max_rss" in (project.folder / "logs/tiny/benchmarks/detect/n3.tsv").read_text()
+
+
+def test_figure_from_picture_and_nothing_to_do_afterwards(project):
+    target = "figures/tiny/fig2.pdf"
+    run = project.snakemake(*tiny(project), "--", target)
+    assert run.returncode == 0, run.stdout
+    assert (project.folder / target).read_bytes().startswith(b"%PDF")
+    assert project.would_run(*tiny(project), "--", target) == {}
+
+
+def test_failing_job_shows_its_one_line_and_leaves_no_output(project):
+    run = project.snakemake(*tiny(project, sha="f" * 64), "--", "results/tiny/views/still.sha256")
+    assert run.returncode != 0
+    assert f"for this picture write reference_sha256: {SHA} or null" in run.stdout
+    assert "Traceback" not in run.stdout
+    assert not (project.folder / "results/tiny/views/still").exists()
+
+
+@pytest.mark.parametrize(
+    ("overlay", "line"),
+    [
+        ("detector: {sigma_mim: 1}", "config: detector.sigma_mim is no setting; did you mean detector.sigma_min?"),
+        ("detector: {epsilon: 1e-6}", "config: detector.epsilon is the text '1e-6', allowed is a number of at least 0: write 1.0e-06"),
+        ("reference: nowhere.png", "config: reference: nowhere.png does not exist: give the path of a picture"),
+    ],
+)  # fmt: skip
+def test_wrong_settings_end_in_one_line(project, overlay, line):
+    (project.folder / "config/wrong.yaml").write_text(overlay + "\n")
+    run = project.snakemake("--dry-run", "--configfile", "config/wrong.yaml")
+    assert run.returncode != 0
+    # Snakemake itself says first which profile and which files of settings it takes.
+    assert run.stdout.splitlines()[2:] == [line]

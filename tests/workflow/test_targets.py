@@ -1,0 +1,73 @@
+"""Every target can be planned, and the rules keep the house's rules."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+from project import ROOT
+
+RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
+FIGURES = [f"fig{n}" for n in range(1, 7)]
+
+
+def test_whole_study_at_the_papers_settings(project):
+    jobs = project.would_run()
+    assert {"fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "all"} <= jobs.keys()
+    assert (jobs["detect"], jobs["detect_stored"], jobs["scale_space"]) == (14, 3, 3)
+    assert sum(jobs.values()) <= 60  # fat jobs
+
+
+@pytest.mark.parametrize(
+    ("target", "rules"),
+    [
+        ("figures/quick/fig1.pdf", {"semigroup", "fig1"}),
+        ("figures/quick/fig2.png", {"simulate", "describe_views", "fig2"}),
+        ("figures/quick/fig6.pdf", {"simulate", "scale_space", "detect_stored", "detect", "match_samplings", "cut_cubes", "fig6"}),
+    ],
+)  # fmt: skip
+def test_figures_need_only_what_they_show(project, target, rules):
+    assert project.would_run("--configfile", "config/quick.yaml", "--", target).keys() == rules
+
+
+@pytest.mark.parametrize(("keep", "stored"), [("true", 6), ("false", 0)])
+def test_any_sampling_can_be_stored_or_streamed(project, keep, stored):
+    project.edit("config/quick.yaml", "keep_scale_spaces: [3]", f"keep_scale_spaces: {keep}")
+    jobs = project.would_run("--configfile", "config/quick.yaml")
+    assert (jobs.get("detect_stored", 0), jobs.get("detect", 0)) == (stored, 6 - stored)
+
+
+@pytest.mark.parametrize("overlay", sorted((ROOT / "config/what_if").glob("*.yaml")), ids=str)
+def test_what_ifs_can_be_planned(project, overlay):
+    jobs = project.would_run("--configfile", f"config/what_if/{overlay.name}")
+    assert jobs["fig6"] == 1
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_rules_of_figures_take_the_tables_that_the_figures_read(figure):
+    tables = importlib.import_module(f"keystab.figures.{figure}").TABLES
+    text = (ROOT / "workflow/rules/figures.smk").read_text()
+    block = re.search(rf"^(?:use )?rule (?:fig1 as )?{figure}\b.*?output:", text, re.M | re.S)
+    assert block
+    assert re.findall(r'f"{RESULTS}/tables/(.*)",', block[0]) == list(tables)
+
+
+@pytest.mark.parametrize("path", RULES, ids=lambda path: path.name)
+def test_rules_keep_the_rules(path: Path):
+    text = path.read_text()
+    assert text.startswith('"""'), "says what comes in, what goes out, and which steps"
+    assert not re.search(r"^ +(run|script|notebook|group|cache):", text, re.M)
+    assert "lambda" not in text
+    for rule in re.split(r"^(?=rule \w+:)", text, flags=re.M)[1:]:
+        for directive in ("log", "benchmark", "message", "shell"):
+            assert re.search(rf"^    {directive}:", rule, re.M), (rule.split(":")[0], directive)
+        assert "code=fingerprint(" in rule and "software=SOFTWARE" in rule
+
+
+@pytest.mark.parametrize("path", RULES, ids=lambda path: path.name)
+def test_settings_reach_rules_with_their_names(path: Path):
+    # Plain values would be compared as a set, without names; see Named in common.smk.
+    for block in re.findall(r"^    params:\n((?:        .*\n)+)", path.read_text(), re.M):
+        assert "config[" not in block and "lookup(" not in block

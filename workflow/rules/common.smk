@@ -1,0 +1,99 @@
+"""What all rules share: checked settings, folders, and what their results depend on.
+
+Comes in: config, as merged by Snakemake from config/config.yaml and the overlays on the command
+line. Goes out: the same, complete and checked, and names for the parts that several rules use.
+Steps: refuse settings that cannot work, with one line per problem; name the folders; fingerprint
+the code and the software.
+"""
+
+import hashlib
+import os
+import sys
+from functools import reduce
+from operator import getitem
+from pathlib import Path
+
+import yaml
+
+from keystab import feasibility, settings
+from keystab.errors import InputError
+from keystab.fingerprint import fingerprint
+
+try:
+    config.update(
+        settings.checked(
+            config,
+            yaml.safe_load(
+                Path(workflow.basedir, "workflow/schemas/config.schema.yaml").read_text()
+            ),
+        )
+    )
+    feasibility.require(config)
+except InputError as problems:
+    sys.exit(str(problems))
+
+
+RESULTS = config["results"]
+DRAWN = config["figures"]
+LOGS = config["logs"]
+
+# Samplings whose scale-space is written to a store; all others are streamed.
+KEPT = feasibility.kept_n_spo(config)
+STREAMED = sorted(set(config["samplings"]["n_spo"]) - set(KEPT))
+
+# Snakemake does not see a change of installed packages; a parameter that changes with the lock
+# file tells it.
+SOFTWARE = hashlib.sha256(Path(workflow.basedir, "environment.lock").read_bytes()).hexdigest()
+
+# Compiled loops are kept with the other things that can be made again, and shared by all jobs.
+os.environ.setdefault("NUMBA_CACHE_DIR", os.path.abspath(".snakemake/numba"))
+
+
+class Named(str):
+    """A parameter that shows its name to Snakemake.
+
+    Snakemake decides whether parameters changed by comparing the set of their representations,
+    without names: of two zeros, one could become any number that another parameter already has,
+    and nothing would be rerun.
+    """
+
+    def __new__(cls, name, value):
+        text = " ".join(map(str, value)) if isinstance(value, list) else str(value)
+        named = super().__new__(cls, text)
+        named.name = name
+        return named
+
+    def __repr__(self):
+        return f"{self.name} = {self}"
+
+
+def setting(place):
+    """Parameter with the value of a setting; wildcards in its place are filled in."""
+
+    def value_of(wildcards):
+        name = place.format(**dict(wildcards.items()))
+        return Named(name, reduce(getitem, name.split("."), config))
+
+    return value_of
+
+
+wildcard_constraints:
+    set="[a-z][a-z0-9_]*",
+    n_spo="[0-9]+",
+
+
+def one_of(numbers):
+    """Regular expression for any of the numbers; matches nothing where there are none."""
+    return "|".join(map(str, numbers)) or "(?!)"
+
+
+def folder_of_inputs(_wildcards, input):
+    """Folder that holds all inputs of a job."""
+    return os.path.dirname(input[0])
+
+
+def max_offset_of_path(_wildcards):
+    """M_offset where the path of a refinement depends on it, as it does for unit steps; else None."""
+    refinement = config["refinement"]
+    depends = refinement["move"] == "unit_step"
+    return Named("refinement.max_offset", refinement["max_offset"] if depends else None)

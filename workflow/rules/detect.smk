@@ -1,0 +1,99 @@
+"""Discrete extrema of the difference of Gaussians, with their refinement traces (section 2.1).
+
+Comes in: the view 'still', or a stored scale-space of it. Goes out: {results}/keypoints/*.parquet,
+one table of extrema and one of refinement traces per sampling, and one table of extrema per row of
+figure 3's grid. Steps: search tile by tile for samples above or below their 26 neighbours; follow
+each through its quadratic models, so that max_offset and max_iterations can be decided afterwards.
+"""
+
+
+rule detect:
+    """Detect the extrema of one balanced sampling, streaming its scale-space."""
+    input:
+        views=ancient(f"{RESULTS}/views/still"),
+        digest=f"{RESULTS}/views/still.sha256",
+    output:
+        extrema=f"{RESULTS}/keypoints/sampling_n{{n_spo}}.parquet",
+        traces=f"{RESULTS}/keypoints/traces_n{{n_spo}}.parquet",
+    log:
+        f"{LOGS}/detect/n{{n_spo}}.log",
+    benchmark:
+        f"{LOGS}/benchmarks/detect/n{{n_spo}}.tsv"
+    wildcard_constraints:
+        n_spo=one_of(STREAMED),
+    params:
+        sigma_min=setting("detector.sigma_min"),
+        kappa=setting("detector.kappa"),
+        oversampling=setting("detector.oversampling"),
+        epsilon=setting("detector.epsilon"),
+        scale_moves=setting("refinement.scale_moves"),
+        move=setting("refinement.move"),
+        max_offset=max_offset_of_path,
+        code=fingerprint("keystab.stages.detect"),
+        software=SOFTWARE,
+    message:
+        "Detecting extrema at the balanced sampling of n_spo = {wildcards.n_spo}"
+    shell:
+        """
+        python -m keystab.stages.detect \
+            --views {input.views:q} \
+            --views-digest {input.digest:q} \
+            --n-spo {wildcards.n_spo} \
+            --sigma-min {params.sigma_min} \
+            --kappa {params.kappa} \
+            --oversampling {params.oversampling} \
+            --epsilon {params.epsilon} \
+            --scale-moves {params.scale_moves} \
+            --move {params.move} \
+            --max-offset {params.max_offset} \
+            --extrema {output.extrema:q} \
+            --traces {output.traces:q} \
+            >{log:q} 2>&1
+        """
+
+
+use rule detect as detect_stored with:
+    input:
+        views=ancient(f"{RESULTS}/views/still"),
+        digest=f"{RESULTS}/views/still.sha256",
+        store=ancient(f"{RESULTS}/scale_space/n{{n_spo}}"),
+        store_digest=f"{RESULTS}/scale_space/n{{n_spo}}.sha256",
+    wildcard_constraints:
+        n_spo=one_of(KEPT),
+
+
+rule detect_grid:
+    """Detect the extrema of one row of figure 3's grid: one n_spo, every delta_min."""
+    input:
+        views=ancient(f"{RESULTS}/views/still"),
+        digest=f"{RESULTS}/views/still.sha256",
+    output:
+        extrema=f"{RESULTS}/keypoints/grid_n{{n_spo}}.parquet",
+    log:
+        f"{LOGS}/detect_grid/n{{n_spo}}.log",
+    benchmark:
+        f"{LOGS}/benchmarks/detect_grid/n{{n_spo}}.tsv"
+    params:
+        delta_min=setting("grid.delta_min"),
+        sigma_min=setting("detector.sigma_min"),
+        kappa=setting("detector.kappa"),
+        oversampling=setting("detector.oversampling"),
+        epsilon=setting("detector.epsilon"),
+        code=fingerprint("keystab.stages.detect_grid"),
+        software=SOFTWARE,
+    message:
+        "Detecting extrema at n_spo = {wildcards.n_spo}, delta_min = {params.delta_min}"
+    shell:
+        """
+        python -m keystab.stages.detect_grid \
+            --views {input.views:q} \
+            --views-digest {input.digest:q} \
+            --n-spo {wildcards.n_spo} \
+            --delta-min {params.delta_min} \
+            --sigma-min {params.sigma_min} \
+            --kappa {params.kappa} \
+            --oversampling {params.oversampling} \
+            --epsilon {params.epsilon} \
+            --extrema {output.extrema:q} \
+            >{log:q} 2>&1
+        """

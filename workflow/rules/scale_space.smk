@@ -1,0 +1,43 @@
+"""Stored scale-spaces (section 2), for people to open and for detection to read.
+
+Comes in: the view 'still'. Goes out: one store per n_spo in keep_scale_spaces,
+{results}/scale_space/n{n_spo}, with a file of digests beside it. Steps: evaluate the octave tile by
+tile; write each tile as a chunk; seal the store. Samplings that are not kept are never written.
+"""
+
+
+rule scale_space:
+    """Write one balanced scale-space of the view to a store."""
+    input:
+        views=ancient(f"{RESULTS}/views/still"),
+        digest=f"{RESULTS}/views/still.sha256",
+    output:
+        store=directory(f"{RESULTS}/scale_space/n{{n_spo}}"),
+        digest=f"{RESULTS}/scale_space/n{{n_spo}}.sha256",
+    log:
+        f"{LOGS}/scale_space/n{{n_spo}}.log",
+    benchmark:
+        f"{LOGS}/benchmarks/scale_space/n{{n_spo}}.tsv"
+    wildcard_constraints:
+        n_spo=one_of(KEPT),
+    params:
+        sigma_min=setting("detector.sigma_min"),
+        kappa=setting("detector.kappa"),
+        oversampling=setting("detector.oversampling"),
+        code=fingerprint("keystab.stages.scale_space"),
+        software=SOFTWARE,
+    message:
+        "Storing the balanced scale-space of n_spo = {wildcards.n_spo}"
+    shell:
+        """
+        python -m keystab.stages.scale_space \
+            --views {input.views:q} \
+            --views-digest {input.digest:q} \
+            --n-spo {wildcards.n_spo} \
+            --sigma-min {params.sigma_min} \
+            --kappa {params.kappa} \
+            --oversampling {params.oversampling} \
+            --store {output.store:q} \
+            --digest {output.digest:q} \
+            >{log:q} 2>&1
+        """
