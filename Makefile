@@ -27,13 +27,13 @@ quick: environment ## Every figure in draft form, in a minute
 	$(SNAKEMAKE) $(QUICK)
 
 figures/quick/% results/quick/%: environment FORCE
-	$(SNAKEMAKE) $(QUICK) $@
+	$(SNAKEMAKE) $@ $(QUICK)
 
 figures/% results/%: environment FORCE
-	$(SNAKEMAKE) $(OVERLAY) $@
+	$(SNAKEMAKE) $@ $(OVERLAY)
 
 why: environment ## What would run, and why (TARGET=figures/fig5.pdf: for one file)
-	@$(SNAKEMAKE) $(OVERLAY) --dry-run $(TARGET)
+	@$(SNAKEMAKE) --dry-run $(TARGET) $(OVERLAY)
 
 test: environment ## All tests
 	pytest -n 2
@@ -58,12 +58,13 @@ format: environment ## Format all code and rules
 	snakefmt Snakefile workflow
 
 lock: ## Renew environment.lock (needs uv)
+	@command -v uv >/dev/null || { echo "error: make lock needs uv: pip install uv" >&2; exit 1; }
 	uv pip compile --universal --fork-strategy fewest --generate-hashes --python-version 3.11 \
 	    --all-extras pyproject.toml -o environment.lock --no-header
 
 clean: ## Delete all results, figures and logs
 	rm -rf figures logs
-	find results -mindepth 1 -maxdepth 1 ! -name reference -exec rm -rf {} + 2>/dev/null || true
+	find results -mindepth 1 -maxdepth 1 ! -name reference ! -name README.md -exec rm -rf {} + 2>/dev/null || true
 
 environment:
 	@tools/environment

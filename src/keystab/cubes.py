@@ -194,12 +194,12 @@ def cubes_around(space: ScaleSpace, keypoints: pd.DataFrame) -> tuple[pd.DataFra
     for panel, centre in enumerate(centres):
         values = space.window(*(slice(int(i) - HALF, int(i) + HALF + 1) for i in centre))
         height = sign[panel] * values
-        level = min(np.quantile(height, 1 - SHARE), height[HALF, HALF, HALF] - 1e-3 * np.ptp(height))
+        level = min(
+            np.quantile(height, 1 - SHARE), height[HALF, HALF, HALF] - 1e-3 * np.ptp(height)
+        )
         levels.append(sign[panel] * level)
         columns = dict(zip(("k_s", "k_y", "k_x"), offsets, strict=True))
         samples.append(pd.DataFrame({"panel": panel, **columns, "value": values.ravel()}))
-    panels = keypoints.assign(
-        extremum=found, level=levels, condition=condition_numbers(hessian)
-    )
+    panels = keypoints.assign(extremum=found, level=levels, condition=condition_numbers(hessian))
     panels.insert(0, "panel", np.arange(len(panels)))
     return panels, pd.concat(samples, ignore_index=True)

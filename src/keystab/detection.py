@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import cKDTree
 
 from keystab.dog_space import ScaleSpace, scale_space
 from keystab.errors import InputError
@@ -250,6 +249,8 @@ def _without_seams(octaves: list[pd.DataFrame], n_spo: int, sigma_min: float) ->
 
 def _same_extremum(finer: pd.DataFrame, coarser: pd.DataFrame, n_spo: int) -> list[tuple[int, int]]:
     """Pairs of detections at the seam of two octaves that are one extremum, each nearest."""
+    from scipy.spatial import cKDTree  # costs a third of the import, and one octave has no seam
+
     i = np.flatnonzero(finer["s"] >= n_spo)
     j = np.flatnonzero(coarser["s"] <= 1)
     if not (i.size and j.size):

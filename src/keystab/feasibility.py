@@ -1,4 +1,4 @@
-"""Can the study be run with these settings, this picture and this disk?
+"""Whether the study can be run with given settings, a picture and a disk.
 
 Every check is a plain function that returns one line per problem, so that a person sees all of
 them before anything is computed.
@@ -12,12 +12,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from keystab.views import effective_blur
 from keystab.errors import InputError
 from keystab.memory import in_words
 from keystab.sampling import Sampling, balanced_delta
 from keystab.settings import refuse
 from keystab.view_sets import per_view, view_shape
+from keystab.views import effective_blur
 
 Settings = Mapping[str, Any]
 
@@ -80,7 +80,8 @@ def _order(block: Settings, name: str, lower: str, upper: str) -> list[str]:
     if block[lower] < block[upper]:
         return []
     return [
-        f"{name}.{lower} is {block[lower]}, allowed is a number below {name}.{upper} = {block[upper]}"
+        f"{name}.{lower} is {block[lower]}, allowed is a number below {name}.{upper} = "
+        f"{block[upper]}"
     ]
 
 

@@ -13,7 +13,7 @@ import ast
 import hashlib
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 PACKAGE_FOLDER = Path(__file__).parent
 
@@ -212,7 +212,7 @@ def _spell(node: ast.AST, tokens: list[str]) -> None:
     """
     tokens.append(type(node).__name__)
     for field in node._fields:
-        value = getattr(node, field, None)
+        value: Any = getattr(node, field, None)
         if field == "body" and _has_docstring(node):
             value = value[1:]
         if value is None or value == [] or field == "kind":

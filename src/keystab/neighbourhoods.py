@@ -15,13 +15,11 @@ from keystab.operators import (
     CosineAxis,
     SplineAxis,
     blurred_spline_rows,
-    fold_range,
+    column_range,
 )
 
 # Candidates handled at once in cosine mode: bounds the memory of their cosines.
 _BATCH = 256
-
-_fold_range = njit(cache=True, nogil=True)(fold_range)
 
 
 def spline_neighbourhoods(
@@ -39,8 +37,8 @@ def spline_neighbourhoods(
     cubes = np.zeros((s.size, 3, 3, 3))
     _spline_cubes(
         source,
-        (y_axis.taps, y_axis.reach, y_axis.column, y_axis.weight),
-        (x_axis.taps, x_axis.reach, x_axis.column, x_axis.weight),
+        (y_axis.n_samples, y_axis.taps, y_axis.reach, y_axis.splines),
+        (x_axis.n_samples, x_axis.taps, x_axis.reach, x_axis.splines),
         y_axis.stride,
         lower,
         upper,
@@ -84,20 +82,14 @@ def cosine_neighbourhoods(
 
 @njit(cache=True, nogil=True)
 def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, cubes):  # noqa: PLR0913
-    y_taps, y_reach, y_column, y_weight = y_axis
-    x_taps, x_reach, x_column, x_weight = x_axis
     y_rows = np.empty((3, source.shape[0]))
     x_rows = np.empty((3, source.shape[1]))
     for k in range(s.size):
         for a in range(3):
             for pair in range(2):
                 blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
-                y_first, y_last = _rows_around(
-                    row[k], stride, y_taps[blur], y_reach[blur], y_column, y_weight, y_rows
-                )
-                x_first, x_last = _rows_around(
-                    column[k], stride, x_taps[blur], x_reach[blur], x_column, x_weight, x_rows
-                )
+                y_first, y_last = _rows_around(row[k], stride, blur, y_axis, y_rows)
+                x_first, x_last = _rows_around(column[k], stride, blur, x_axis, x_rows)
                 _add_products(
                     source[y_first:y_last, x_first:x_last],
                     y_rows[:, : y_last - y_first],
@@ -108,21 +100,13 @@ def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, 
 
 
 @njit(cache=True, nogil=True)
-def _rows_around(index, stride, taps, reach, column, weight, rows):
+def _rows_around(index, stride, blur, axis, rows):
     """Rows index - 1 .. index + 1 of the blurred spline, and the columns that they span."""
-    low, high = _fold_range((index - 1) * stride - reach, (index + 1) * stride + reach, column.size)
-    first, last = column[low], column[high] + 4
+    n_samples, taps, reaches, splines = axis
+    start, reach = (index - 1) * stride, reaches[blur]
+    first, last = column_range(start - reach, start + 2 * stride + reach, n_samples, splines)
     rows[:, : last - first] = 0.0
-    blurred_spline_rows(
-        (index - 1) * stride,
-        stride,
-        taps,
-        reach,
-        column,
-        weight,
-        first,
-        rows[:, : last - first],
-    )
+    blurred_spline_rows(start, stride, taps[blur], reach, splines, first, rows[:, : last - first])
     return first, last
 
 

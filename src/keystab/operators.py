@@ -87,24 +87,24 @@ class SplineAxis:
     ) -> None:
         self.n_samples = n_samples
         self.stride = stride
-        self.column, self.weight = spline_rows(n_samples, n_pixels, delta_min)
         kernels = [cosine_domain_kernel(n_samples, blur / delta_min) for blur in blurs]
         self.reach = np.array([kernel.size - 1 for kernel in kernels])
-        self.taps = np.zeros((len(kernels), self.reach.max() + 1))
-        for row, kernel in zip(self.taps, kernels, strict=True):
-            row[: kernel.size] = kernel
+        self.taps = two_sided(kernels, n_samples)
+        self.splines = mirrored_splines(
+            *spline_rows(n_samples, n_pixels, delta_min), self.taps.shape[1] // 2
+        )
 
     def block(self, start: int, stop: int) -> Block:
         """See `AxisOperator.block`."""
         factors = []
+        first_sample, last_sample = start * self.stride, (stop - 1) * self.stride
         for taps, reach in zip(self.taps, self.reach, strict=True):
-            low, high = fold_range(
-                start * self.stride - reach, (stop - 1) * self.stride + reach, self.n_samples
+            first, last = column_range(
+                first_sample - reach, last_sample + reach, self.n_samples, self.splines
             )
-            first = int(self.column[low])
-            rows = np.zeros((stop - start, int(self.column[high]) + 4 - first))
+            rows = np.zeros((stop - start, last - first))
             blurred_spline_rows(
-                start * self.stride, self.stride, taps, reach, self.column, self.weight, first, rows
+                first_sample, self.stride, taps, int(reach), self.splines, first, rows
             )
             factors.append((first, rows))
         return Block(None, factors)
@@ -258,49 +258,84 @@ def band_limited_basis(n_samples: int, spacing: float) -> np.ndarray | None:
     return np.ascontiguousarray(left[:, :rank]) if rank < 0.7 * n_samples else None
 
 
-def fold_range(low: int, high: int, n_samples: int) -> tuple[int, int]:
-    """Smallest and largest grid index that `low` .. `high` touch after half-sample mirroring."""
+class MirroredSplines(NamedTuple):
+    """Cubic B-splines of the fine samples and of their mirror images on both sides.
+
+    Attributes
+    ----------
+    column : ndarray of int, shape (n,)
+        First of the four columns of each sample.
+    weight : ndarray, shape (n, 4)
+        Weights of its four columns.
+    stop : ndarray of int, shape (n,)
+        Index of the next sample that has other columns.
+    """
+
+    column: np.ndarray
+    weight: np.ndarray
+    stop: np.ndarray
+
+
+def mirrored_splines(column: np.ndarray, weight: np.ndarray, margin: int) -> MirroredSplines:
+    """Continue the rows of `spline_rows` by their half-sample mirror, `margin` <= m each side."""
+    column = np.pad(column, margin, mode="symmetric")
+    weight = np.pad(weight, ((margin, margin), (0, 0)), mode="symmetric")
+    changes = np.flatnonzero(np.diff(column)) + 1
+    stop = np.append(changes, column.size)
+    return MirroredSplines(
+        column, weight, stop[np.searchsorted(changes, np.arange(column.size), side="right")]
+    )
+
+
+def two_sided(kernels: list[np.ndarray], n_samples: int) -> np.ndarray:
+    """Both sides of all kernels in one array, the distance 0 in its middle column."""
+    reach = max(kernel.size for kernel in kernels) - 1
+    taps = np.zeros((len(kernels), 2 * reach + 1))
+    for row, kernel in zip(taps, kernels, strict=True):
+        row[reach : reach + kernel.size] = kernel
+        row[reach - kernel.size + 1 : reach + 1] = kernel[::-1]
+        if kernel.size > n_samples:
+            row[reach - n_samples] = 0.0  # the period 2m holds the distance m once, not twice
+    return taps
+
+
+@njit(cache=True, nogil=True)
+def column_range(low, high, n_samples, splines):
+    """First column, and one past the last, that samples `low` .. `high` meet once mirrored."""
+    margin = (splines.column.size - n_samples) // 2
     first, last = max(low, 0), min(high, n_samples - 1)
     if low < 0:
         last = max(last, min(-1 - low, n_samples - 1))
     if high >= n_samples:
         first = min(first, max(2 * n_samples - 1 - high, 0))
-    return first, last
+    return splines.column[first + margin], splines.column[last + margin] + 4
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def blurred_spline_rows(start, stride, taps, reach, column, weight, first, out):  # noqa: PLR0913
+def blurred_spline_rows(start, stride, taps, reach, splines, first, out):
     """Fill `out` (zeroed) with rows ``start, start + stride, ...`` of the blurred spline.
 
     The four weights of consecutive fine samples meet the same four columns until the next knot
-    is passed, so that sums are kept in registers until then.
+    is passed, so that sums stay in registers until then.
     """
-    n_samples = column.size
+    column, weight, stops = splines
+    middle = taps.size // 2  # also the number of samples mirrored on each side
     for row in range(out.shape[0]):
         centre = start + row * stride
-        here = -1
-        a0 = a1 = a2 = a3 = 0.0
-        # A kernel as long as the grid holds the distance m once, not twice.
-        for distance in range(-reach if reach < n_samples else 1 - reach, reach + 1):
-            sample = centre + distance
-            if sample < 0:
-                sample = -1 - sample
-            elif sample >= n_samples:
-                sample = 2 * n_samples - 1 - sample
-            if column[sample] != here:
-                if here >= 0:
-                    out[row, here - first] += a0
-                    out[row, here - first + 1] += a1
-                    out[row, here - first + 2] += a2
-                    out[row, here - first + 3] += a3
-                here = column[sample]
-                a0 = a1 = a2 = a3 = 0.0
-            tap = taps[abs(distance)]
-            a0 += tap * weight[sample, 0]
-            a1 += tap * weight[sample, 1]
-            a2 += tap * weight[sample, 2]
-            a3 += tap * weight[sample, 3]
-        out[row, here - first] += a0
-        out[row, here - first + 1] += a1
-        out[row, here - first + 2] += a2
-        out[row, here - first + 3] += a3
+        sample = centre - reach + middle
+        last = centre + reach + middle
+        while sample <= last:
+            stop = min(stops[sample], last + 1)
+            here = column[sample] - first
+            a0 = a1 = a2 = a3 = 0.0
+            for i in range(sample, stop):
+                tap = taps[i - centre]
+                a0 += tap * weight[i, 0]
+                a1 += tap * weight[i, 1]
+                a2 += tap * weight[i, 2]
+                a3 += tap * weight[i, 3]
+            out[row, here] += a0
+            out[row, here + 1] += a1
+            out[row, here + 2] += a2
+            out[row, here + 3] += a3
+            sample = stop

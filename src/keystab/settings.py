@@ -152,20 +152,21 @@ def schema_problems(given: Settings, schema: Schema) -> list[str]:
 def _explain(error: jsonschema.ValidationError) -> Iterator[tuple[str, str]]:
     place = _name(error.absolute_path)
     schema: Any = error.schema
+    value: Any = error.instance
     if error.validator == "additionalProperties":
         known = [str(key) for key in schema.get("properties", {})]
-        for key in error.instance:
+        for key in value:
             if key not in schema.get("properties", {}):
                 yield _join(place, key), _unknown(place, key, known)
     elif error.validator == "propertyNames" or "propertyNames" in error.absolute_schema_path:
         yield (
-            f"{place}:{error.instance}",
-            f"{place} has {error.instance!r}, allowed are names of small letters, digits and _ "
+            f"{place}:{value}",
+            f"{place} has {value!r}, allowed are names of small letters, digits and _ "
             "that start with a letter",
         )
     else:
-        text = f"{place} is {_given(error.instance)}, allowed is {allowed(schema)}"
-        yield place, text + _what_to_type(error.instance, schema)
+        text = f"{place} is {_given(value)}, allowed is {allowed(schema)}"
+        yield place, text + _what_to_type(value, schema)
 
 
 def _unknown(place: str, key: object, known: Sequence[str]) -> str:
@@ -282,10 +283,11 @@ def _yaml_number(value: float) -> str:
 
 def _check_type(validator: Any, types: Any, value: Any, schema: Schema) -> Iterator[Any]:
     """The standard check, and numbers must be finite unless the schema says ``infinite``."""
-    if isinstance(value, float) and not math.isfinite(value):
-        if math.isnan(value) or not schema.get("infinite"):
-            yield jsonschema.ValidationError("not finite")
-            return
+    if isinstance(value, float) and (
+        math.isnan(value) or (math.isinf(value) and not schema.get("infinite"))
+    ):
+        yield jsonschema.ValidationError("not finite")
+        return
     yield from jsonschema.Draft202012Validator.VALIDATORS["type"](validator, types, value, schema)
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from keystab.views import ViewSpec
 from keystab.errors import InputError
+from keystab.views import ViewSpec
 
 PER_VIEW = ("blur", "step", "shift_y", "shift_x", "rotation", "noise")
 """What is one number for all views or one number per view."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import jsonschema
@@ -137,3 +139,9 @@ def test_unreadable_files_get_one_line(tmp_path, text, line):
     with pytest.raises(InputError) as caught:
         settings.read_yaml(path)
     assert line in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_table_of_settings_in_the_readme_is_up_to_date():
+    # Otherwise: python tools/settings_table.py
+    command = [sys.executable, str(ROOT / "tools/settings_table.py"), "--check"]
+    assert subprocess.run(command).returncode == 0

@@ -58,7 +58,7 @@ def test_edits_of_code(finished, name, old, new, expected):
         ("refinement: {move: unit_step}", {"detect", "detect_stored", "count_refined"} | MATCHING),
         ("comparison: {match_sign: true}", MATCHING),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
-        ("cubes: {count: 5}", {"cut_cubes", "fig6"}),
+        ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
         ("draft: false", FIGURES),
         # 1.1 is also the blur and 0.0 also the shift: the set of values stays the same.

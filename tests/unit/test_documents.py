@@ -1,0 +1,145 @@
+"""What the documents say exists, and what they show runs."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shlex
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from keystab import cli, scale_space
+from keystab.stores import write_scale_space, write_views
+from keystab.views import ViewSpec
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = sorted(
+    path.relative_to(ROOT).as_posix()
+    for folder in (".", "config", "results", "benchmarks/results")
+    for path in (ROOT / folder).glob("*.md")
+)
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+PARTS = ("benchmarks", "config", "docs", "src", "tests", "tools", "workflow")
+
+
+def text_of(document: str) -> str:
+    return (ROOT / document).read_text()
+
+
+def prose(document: str) -> str:
+    return FENCE.sub("", text_of(document))
+
+
+def blocks(document: str, language: str) -> list[str]:
+    return [body for kind, body in FENCE.findall(text_of(document)) if kind == language]
+
+
+def anchors(document: str) -> set[str]:
+    """Anchors of the headings, as code forges make them."""
+    titles = re.findall(r"^#+ (.+)$", prose(document), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def settings(schema: dict, name: str = "") -> set[str]:
+    """Places of all settings and blocks; NAME stands for the name of a set of views."""
+    places = {name} if name else set()
+    for key, part in schema.get("properties", {}).items():
+        places |= settings(part, f"{name}.{key}" if name else key)
+    if isinstance(schema.get("additionalProperties"), dict):
+        places |= settings(schema["additionalProperties"], f"{name}.NAME")
+    return places
+
+
+def test_documents_are_found():
+    assert {"README.md", "REPRODUCING.md", "DEVIATIONS.md", "config/README.md"} <= set(DOCUMENTS)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_links_lead_somewhere(document):
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose(document)):
+        if link.startswith("https://"):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (ROOT / document).parent / path if path else ROOT / document
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target.relative_to(ROOT).as_posix()), link
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_files_named_exist(document):
+    for name in re.findall(r"`([\w./-]+)`", prose(document)):
+        if name.split("/")[0] in PARTS and "NAME" not in name and "figN" not in name:
+            assert (ROOT / name).exists(), name
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_make_targets_exist(document):
+    makefile = (ROOT / "Makefile").read_text()
+    rules = re.findall(r"^([\w/%. -]+):", makefile, re.MULTILINE)
+    targets = {name.replace("%", "") for rule in rules for name in rule.split()}
+    commands = re.findall(r"`make ([^`]+)`", prose(document))
+    commands += re.findall(r"^make (.+)$", "\n".join(blocks(document, "sh")), re.MULTILINE)
+    for command in commands:
+        words = takewhile(lambda word: word != "#", command.split())
+        for word in words:
+            if "=" in word:
+                assert word.split("=")[0] in makefile, command
+                if word.startswith("WITH=config"):
+                    assert (ROOT / word.removeprefix("WITH=").replace("NAME", "cosine")).exists()
+            else:
+                assert word in targets or any(
+                    word.startswith(target) for target in targets if target.endswith("/")
+                ), command
+
+
+def test_settings_of_deviations_exist():
+    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+    known = settings(schema)
+    rows = [line.split(" | ") for line in text_of("DEVIATIONS.md").splitlines() if " | " in line]
+    named = [name for row in rows for name in re.findall(r"`([\w.]+)` *[|,]", ", " + row[-1] + "|")]
+    named = [name for name in named if not name.endswith(".csv")]
+    assert len(named) > 25
+    for name in named:
+        place = re.sub(r"^sets\.\w+", "sets.NAME", name)
+        assert place in known, name
+
+
+def test_commands_of_the_readme_are_understood():
+    lines = "\n".join(blocks("README.md", "sh")).splitlines()
+    commands = [shlex.split(line) for line in lines if line.startswith("keystab ")]
+    assert {command[1] for command in commands} == {"simulate", "detect", "inspect"}
+    for command in commands:
+        cli._parser().parse_args(command[1:])  # exits where it does not understand
+
+
+def test_examples_of_the_readme_run(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    pairs = re.findall(
+        r"^```python\n(.*?)^```\s+^```\n(.*?)^```", text_of("README.md"), re.M | re.S
+    )
+    assert len(pairs) == len(blocks("README.md", "python")) == 3
+    names: dict = {}
+    for code, shown in pairs:
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(code, names)
+        assert printed.getvalue() == shown
+
+
+def test_example_of_stores_runs(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    image = np.random.default_rng(1).random((112, 212))
+    space = scale_space(image, camera_blur=1.1, n_spo=3)
+    write_scale_space(space, tmp_path / "results/scale_space/n15")
+    write_views([image], [ViewSpec(1.1, 10.0, image.shape)], tmp_path / "results/views/still")
+    (code,) = blocks("REPRODUCING.md", "python")
+    exec(code, {})
+    sizes, peak, views = capsys.readouterr().out.splitlines()
+    assert sizes.startswith(str(dict(zip(("scale", "y", "x"), space.shape, strict=True))))
+    assert set(eval(peak.split("}")[0] + "}")) == {"sigma", "y", "x"}
+    assert views == "('view', 'y', 'x') 1.1 10.0"
