@@ -86,6 +86,11 @@ class ScaleSpace:
         return np.ascontiguousarray(cosine_source(self.image))
 
     @cached_property
+    def single_source(self) -> np.ndarray:
+        """The source in single precision."""
+        return self.source.astype(np.float32)
+
+    @cached_property
     def blurs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Distinct blurs and, for each slice, the index of its lower and upper one."""
         return self.sampling.blurs()
@@ -155,7 +160,8 @@ class ScaleSpace:
         Parameters
         ----------
         along : list of Block
-            Operators of the y axis for the rows of each block.
+            Operators of the y axis for the rows of each block. Their precision, single or double,
+            is that of the result.
         columns : tuple of int
             First column and one past the last.
         slices : tuple of int
@@ -169,7 +175,9 @@ class ScaleSpace:
         lower, upper = (index[slice(*slices)] for index in self.blurs[1:])
         needed = np.unique([lower, upper])
         lower, upper = np.searchsorted(needed, lower), np.searchsorted(needed, upper)
-        across = self.axes[1].block(*columns)
+        precision = along[0].factors[0][1].dtype
+        source = self.source if precision == np.float64 else self.single_source
+        across = self.axes[1].block(*columns).as_type(precision)
         # Products along x with every source row that some block needs, shared by all blocks.
         factors = [block.factors[blur] for block in along for blur in needed]
         first = min(j for j, _ in factors)
@@ -177,10 +185,10 @@ class ScaleSpace:
         strips = []
         for blur in needed:
             j, matrix = across.factors[blur]
-            strips.append(self.source[first:last, j : j + matrix.shape[1]] @ matrix.T)
+            strips.append(source[first:last, j : j + matrix.shape[1]] @ matrix.T)
         tallest = max(block.factors[0][1].shape[0] for block in along)
-        blurred = np.empty((needed.size, tallest, strips[0].shape[1]))
-        dog = np.empty((lower.size, tallest, strips[0].shape[1]))
+        blurred = np.empty((needed.size, tallest, strips[0].shape[1]), precision)
+        dog = np.empty((lower.size, tallest, strips[0].shape[1]), precision)
         for block in along:
             height = block.factors[0][1].shape[0]
             for blur, strip, out in zip(needed, strips, blurred, strict=True):
@@ -241,6 +249,22 @@ class ScaleSpace:
         else:
             amplitude = float(np.abs(self.image - self.image.mean()).max())
         return 2.0**-46 * amplitude
+
+    def error_bound(self, precision: type) -> float:
+        r"""Bound of the error of a difference of two samples of a block.
+
+        In single precision u = 2^-24: a sum of n products, of numbers that were themselves rounded,
+        errs by at most (n + 3) u times the sum of the absolute values of the products. Both axes
+        and two Gaussians for each of two samples take part, and a few roundings of the differences
+        themselves. In double precision it is half of `rounding`.
+        """
+        if precision == np.float64 or self.oversampling != "spline":
+            return self.rounding / 2
+        y_axis, x_axis = self.axes
+        assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
+        largest = float(np.abs(self.source).max()) * y_axis.gain * x_axis.gain
+        roundings = 4 * (y_axis.n_terms + x_axis.n_terms + 6) + 8
+        return 1.01 * roundings * 2.0**-24 * largest
 
     def attributes(self) -> dict[str, object]:
         """Everything needed to build this scale-space again from its image."""

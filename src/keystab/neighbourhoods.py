@@ -70,8 +70,8 @@ def cosine_neighbourhoods(
             source,
             y_axis.basis(row[part, None] + around),
             x_axis.basis(column[part, None] + around),
-            (y_axis.gain, y_axis.n_frequencies),
-            (x_axis.gain, x_axis.n_frequencies),
+            y_axis.gains,
+            x_axis.gains,
             lower,
             upper,
             s[part],
@@ -111,28 +111,29 @@ def _rows_around(index, stride, blur, axis, rows):
 
 
 @njit(cache=True, nogil=True)
-def _cosine_cubes(source, y_basis, x_basis, y_axis, x_axis, lower, upper, s, cubes):  # noqa: PLR0913
-    y_gain, y_count = y_axis
-    x_gain, x_count = x_axis
-    y_rows = np.empty((3, source.shape[0]))
-    x_rows = np.empty((3, source.shape[1]))
+def _cosine_cubes(source, y_basis, x_basis, y_gains, x_gains, lower, upper, s, cubes):  # noqa: PLR0913
+    n_y, n_x = source.shape
+    # Rows of all six Gaussians of a cube: upper and lower of three slices, three rows each.
+    rows = np.empty((18, n_y))
     for k in range(s.size):
         for a in range(3):
             for pair in range(2):
                 blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
-                n_y, n_x = y_count[blur], x_count[blur]
                 for b in range(3):
                     for i in range(n_y):
-                        y_rows[b, i] = y_basis[k, b, i] * y_gain[blur, i]
-                    for j in range(n_x):
-                        x_rows[b, j] = x_basis[k, b, j] * x_gain[blur, j]
-                _add_products(
-                    source[:n_y, :n_x],
-                    y_rows[:, :n_y],
-                    x_rows[:, :n_x],
-                    1.0 if pair == 0 else -1.0,
-                    cubes[k, a],
-                )
+                        rows[6 * a + 3 * pair + b, i] = y_basis[k, b, i] * y_gains[blur, i]
+        lines = np.dot(rows, source)
+        for a in range(3):
+            for pair in range(2):
+                blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
+                for b in range(3):
+                    for e in range(3):
+                        total = 0.0
+                        for j in range(n_x):
+                            total += lines[6 * a + 3 * pair + b, j] * (
+                                x_basis[k, e, j] * x_gains[blur, j]
+                            )
+                        cubes[k, a, b, e] += total if pair == 0 else -total
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})

@@ -23,15 +23,20 @@ from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 import scipy.fft
 import scipy.ndimage
 from numba import njit
 
 from keystab import cosine
 
-# Kernel values below this do not reach the last digit of a blurred image in [0, 1]; it is also
-# where the rounding of the transform that makes the kernel begins.
-_NEGLIGIBLE = 1e-17
+# Kernel values below this do not reach the last digit of a blurred image in [0, 1]; rounding of the
+# transform that makes the kernel stays below it.
+_NEGLIGIBLE = 3e-17
+
+# From this blur on, in samples, the band limit of the grid lies below the last digit: the kernel is
+# a sampled Gaussian and ends where that does, at 8.6 standard deviations.
+_LOCAL_BLUR, _LOCAL_REACH = 2.9, 8.6
 
 # Half-sample mirror of the spline coefficients on either side, so that the four columns of a row
 # are always neighbours.
@@ -60,6 +65,14 @@ class Block(NamedTuple):
     expand: np.ndarray | None
     factors: list[tuple[int, np.ndarray]]
 
+    def as_type(self, precision: npt.DTypeLike) -> Block:
+        """Return the same block in another floating-point precision."""
+        common, factors = self
+        return Block(
+            None if common is None else common.astype(precision, copy=False),
+            [(first, matrix.astype(precision, copy=False)) for first, matrix in factors],
+        )
+
 
 class SplineAxis:
     """Cubic B-spline oversampling followed by the cosine-domain Gaussian of the fine grid.
@@ -86,6 +99,7 @@ class SplineAxis:
         self, n_samples: int, n_pixels: int, delta_min: float, stride: int, blurs: np.ndarray
     ) -> None:
         self.n_samples = n_samples
+        self.delta_min = delta_min
         self.stride = stride
         kernels = [cosine_domain_kernel(n_samples, blur / delta_min) for blur in blurs]
         self.reach = np.array([kernel.size - 1 for kernel in kernels])
@@ -93,6 +107,17 @@ class SplineAxis:
         self.splines = mirrored_splines(
             *spline_rows(n_samples, n_pixels, delta_min), self.taps.shape[1] // 2
         )
+
+    @property
+    def n_terms(self) -> int:
+        """Most columns of a row that are not zero."""
+        n_pixels = self.splines.column.max() + 4
+        return int(min(n_pixels, 2 * self.reach.max() * self.delta_min + 6))
+
+    @property
+    def gain(self) -> float:
+        """Largest sum of absolute values of a row: weights of a B-spline add up to one."""
+        return float(np.abs(self.taps).sum(axis=1).max())
 
     def block(self, start: int, stop: int) -> Block:
         """See `AxisOperator.block`."""
@@ -124,7 +149,7 @@ class CosineAxis:
     ) -> None:
         self.n_pixels = n_pixels
         self.spacing = delta_min * stride
-        self.gain = np.array([cosine.gaussian(n_pixels, blur) for blur in blurs])
+        self.gains = np.array([cosine.gaussian(n_pixels, blur) for blur in blurs])
         self.n_frequencies = np.array([cosine.significant(n_pixels, blur) for blur in blurs])
 
     def block(self, start: int, stop: int) -> Block:
@@ -139,7 +164,7 @@ class CosineAxis:
         common = rows if expand is None else expand.T @ rows
         factors = [
             (0, common[:, :count] * gain[:count])
-            for count, gain in zip(self.n_frequencies, self.gain, strict=True)
+            for count, gain in zip(self.n_frequencies, self.gains, strict=True)
         ]
         return Block(expand, factors)
 
@@ -228,6 +253,8 @@ def cosine_domain_kernel(n_samples: int, blur: float) -> np.ndarray:
     kernel = scipy.fft.irfft(np.exp(-0.5 * (blur * frequency) ** 2), 2 * n_samples)
     kernel = kernel[: n_samples + 1]
     reach = int(np.flatnonzero(np.abs(kernel) > _NEGLIGIBLE)[-1])
+    if blur >= _LOCAL_BLUR:
+        reach = min(reach, int(_LOCAL_REACH * blur) + 1)
     return np.ascontiguousarray(kernel[: reach + 1])
 
 

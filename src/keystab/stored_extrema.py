@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from keystab.dog_space import ScaleSpace
 from keystab.errors import InputError
-from keystab.extrema import extrema_of_array
+from keystab.extrema import decided, extrema_of_array
 from keystab.progress import progress
 from keystab.stores import TILE, StoredScaleSpace
 
@@ -39,6 +39,7 @@ def stored_extrema(
     """
     _require_same(store, space)
     tolerance = max(epsilon, space.rounding)
+    error = space.error_bound(np.float64)
     n_rows = store.shape[1]
     found = [np.empty((0, 4), dtype=np.int64)]
     above = np.empty((store.shape[0], 0, store.shape[2]))  # last two rows of the tiles before
@@ -46,9 +47,9 @@ def stored_extrema(
     for top in progress(starts, len(starts), f"extrema of {n_rows} stored rows"):
         rows = store.window(rows=slice(top, min(top + TILE, n_rows)))
         rows = np.concatenate([above, rows], axis=1)
-        found.append(extrema_of_array(rows, tolerance, (top - above.shape[1], 0)))
+        found.append(extrema_of_array(rows, tolerance - error, (top - above.shape[1], 0)))
         above = rows[:, -2:].copy()
-    extrema = np.concatenate(found)
+    extrema = decided(space, np.concatenate(found), tolerance)
     return extrema[np.lexsort((extrema[:, 2], extrema[:, 1], extrema[:, 0]))]
 
 

@@ -1,0 +1,20 @@
+"""Compile the library's loops once, where the study and the tests keep them.
+
+Compiling takes as long as a draft of all figures; the set-up does it so that no job waits for it.
+"""
+
+import os
+from pathlib import Path
+
+os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).parents[1] / ".snakemake" / "numba")
+
+import numpy as np  # noqa: E402
+
+from keystab.detection import detect_keypoints  # noqa: E402
+from keystab.extrema import extrema_of_array  # noqa: E402
+
+if __name__ == "__main__":
+    picture = np.random.default_rng(0).random((40, 40))
+    for oversampling in ("spline", "cosine"):
+        detect_keypoints(picture, 0.5, n_spo=8, oversampling=oversampling)
+    extrema_of_array(np.zeros((3, 3, 3)), 0.0)
