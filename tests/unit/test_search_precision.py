@@ -3,9 +3,10 @@
 import numpy as np
 import plain_detector as plain
 import pytest
+from scenes import blobs
+
 from keystab import extrema
 from keystab.dog_space import scale_space
-from scenes import blobs
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-4, 255.0])

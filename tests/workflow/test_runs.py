@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 TINY = """
-sets: {still: {step: 40}, examples: {step: [40, 28, 20], height: 56, width: 100}}
+sets: {still: {step: 40}, examples: {step: [40, 28, 20]}}
 samplings: {n_spo: [3, 4]}
 keep_scale_spaces: KEEP
 reference_sha256: SHA
