@@ -12,11 +12,14 @@ import hashlib
 import json
 import math
 import operator
+import os
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keystab import cosine, memory
+from keystab.errors import InputError
 from keystab.views import ViewSpec, effective_blur, to_reference, to_view
 
 __all__ = [
@@ -55,7 +58,8 @@ class Scene:
     Raises
     ------
     InputError
-        If `reference` is no image of finite values.
+        If `reference` is no image of finite real values; a path is none, see
+        `keystab.pictures.read_picture`.
 
     Examples
     --------
@@ -64,7 +68,7 @@ class Scene:
     """
 
     def __init__(self, reference: ArrayLike) -> None:
-        self.coefficients = cosine.coefficients(reference)
+        self.coefficients = cosine.coefficients(_grey_values(reference))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -209,6 +213,21 @@ def random_generator(*purpose: int | str) -> np.random.Generator:
     parts = [part if isinstance(part, str) else operator.index(part) for part in purpose]
     digest = hashlib.sha256(json.dumps(parts).encode()).digest()
     return np.random.Generator(np.random.Philox(key=int.from_bytes(digest[:16], "big")))
+
+
+def _grey_values(reference: ArrayLike) -> NDArray[Any]:
+    """Return an array of real numbers."""
+    if isinstance(reference, (str, bytes, os.PathLike)):
+        raise InputError(
+            f"the reference is {reference!r}; give the array that read_picture returns"
+        )
+    try:
+        values = np.asarray(reference)
+    except ValueError:  # rows of different lengths
+        raise InputError("the reference is no array; give one of shape (height, width)") from None
+    if values.dtype.kind not in "biuf":
+        raise InputError(f"the reference holds {values.dtype} values; give real numbers")
+    return values
 
 
 def _interpolate(

@@ -69,9 +69,10 @@ def simulate(args: argparse.Namespace) -> None:
     """Take a view of a picture with the simulated camera and write it."""
     from keystab.camera import Scene, ViewSpec
     from keystab.camera import simulate as take
-    from keystab.pictures import check_writable, read_picture, write_picture
+    from keystab.files import check_writable
+    from keystab.pictures import FORMATS, read_picture, write_picture
 
-    check_writable(args.out)
+    check_writable(args.out, FORMATS)
     # Bad values are refused before the picture is read, which also decides the default shape.
     spec = ViewSpec(
         args.blur,
@@ -94,7 +95,8 @@ def simulate(args: argparse.Namespace) -> None:
     view = take(scene, spec)
     write_picture(view, args.out)
     outside = int(((view < 0) | (view > 1)).sum())
-    clipped = f"; {outside} pixels clipped to [0, 1]" if outside and _is_png(args.out) else ""
+    pixels = f"{outside} pixel{'s' * (outside != 1)}"
+    clipped = f"; {pixels} clipped to [0, 1]" if outside and _is_png(args.out) else ""
     print(
         f"{args.out}: {view.shape[0]} x {view.shape[1]} pixels, camera blur {args.blur:g}{clipped}",
         file=sys.stderr,
@@ -104,11 +106,12 @@ def simulate(args: argparse.Namespace) -> None:
 def detect(args: argparse.Namespace) -> None:
     """Detect the keypoints of a picture and write them as a table."""
     from keystab.detection import detect_keypoints
+    from keystab.files import check_writable
     from keystab.pictures import read_picture
-    from keystab.tables import check_writable, to_csv, write_table
+    from keystab.tables import FORMATS, to_csv, write_table
 
     if args.output is not None:
-        check_writable(args.output)
+        check_writable(args.output, FORMATS)
     image = read_picture(args.picture)
     options = {name: getattr(args, name) for name in args.parameters}
     start = time.monotonic()
@@ -118,7 +121,8 @@ def detect(args: argparse.Namespace) -> None:
         sys.stdout.write(to_csv(keypoints))
     else:
         write_table(keypoints, args.output)
-    print(f"{args.picture}: {len(keypoints)} keypoints in {seconds:.1f} s", file=sys.stderr)
+    found = f"{len(keypoints)} keypoint{'s' * (len(keypoints) != 1)}"
+    print(f"{args.picture}: {found} in {seconds:.1f} s", file=sys.stderr)
 
 
 def inspect(args: argparse.Namespace) -> None:

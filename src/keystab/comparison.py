@@ -1,8 +1,11 @@
 """Which detections of different samplings are compared (section 5.1, "Boundary effect").
 
-A sampling cannot find extrema in its first half scale step, so that coarse samplings reach less far
-down than fine ones; and the mirror at the border of the image moves with the sampling. Comparisons
-therefore keep to a common range of scales and away from the border.
+Extrema are sought in the slices 1 to n_spo. They stand for scales from half a step above the first
+scale to half a step above the end of the octave, so that a coarse sampling starts higher than a
+fine one and also ends higher, by up to a factor of 2**(1/6) at n_spo = 3. And the mirror at the
+border of the image moves with the sampling. Comparisons therefore keep to a common range of scales
+and away from the border. The paper cuts the range at its lower end only; an upper end is optional
+here.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ def comparable(
     first_scale: float = 2 ** (1 / 3),
     border: float = 3.0,
     scale_column: str = "step_sigma",
+    last_scale: float | None = None,
 ) -> NDArray[np.bool_]:
     """Whether each detection lies in the common range of scales and inside the margin.
 
@@ -38,11 +42,13 @@ def comparable(
         Column of the scale that is compared with the range. For discrete extrema this is the scale
         after one unbounded quadratic step: their grid scale would admit a whole slice or none of
         it, depending on the sampling.
+    last_scale : float, optional
+        Upper end of the range of scales, over `sigma_min`; none if not given.
 
     Returns
     -------
     ndarray of bool
-        False also where the scale is NaN.
+        The range includes its ends. False also where the scale is NaN.
 
     Examples
     --------
@@ -51,7 +57,10 @@ def comparable(
     >>> comparable(found, (11, 11), sigma_min=1.1).tolist()
     [True, False, False]
     """
-    inside = detections[scale_column].to_numpy() >= sigma_min * first_scale
+    scale = detections[scale_column].to_numpy()
+    inside = scale >= sigma_min * first_scale
+    if last_scale is not None:
+        inside &= scale <= sigma_min * last_scale
     for axis, size in zip(("y", "x"), shape, strict=True):
         position = detections[axis].to_numpy()
         inside &= (position >= border) & (position <= size - 1 - border)

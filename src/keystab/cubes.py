@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.camera import random_generator
 from keystab.dog_space import ScaleSpace, scale_space
+from keystab.duplicates import SCALE_RATIO, SPACE_TOLERANCE
 from keystab.errors import InputError
 from keystab.extrema import extrema_of_array
 from keystab.features import condition_numbers
@@ -16,9 +19,6 @@ from keystab.stability import label
 
 HALF = 12
 """Samples on each side of the centre: cubes of 25 x 25 x 25."""
-
-SEARCH = 9
-"""Samples around a keypoint among which its extremum is sought in the dense scale-space."""
 
 SHARE = 0.15
 """Share of a cube's samples that lie inside its surface: shapes then compare at one size."""
@@ -31,14 +31,18 @@ def dense_scale_space(
     sigma_min: float,
     kappa: float,
     oversampling: str,
+    scale_ratio: float = SCALE_RATIO,
 ) -> ScaleSpace:
-    """Balanced scale-space whose slices reach one cube beyond the octave.
+    """Balanced scale-space with room above the octave for an extremum and the cube around it.
 
     Parameters
     ----------
     image, camera_blur, n_spo, sigma_min, kappa, oversampling
         See `keystab.dog_space.scale_space`.
+    scale_ratio : float
+        How far an extremum may be from a keypoint, see `nearest_extrema`.
     """
+    reach = math.ceil(n_spo * math.log2(scale_ratio))
     return scale_space(
         image,
         camera_blur,
@@ -46,12 +50,12 @@ def dense_scale_space(
         sigma_min=sigma_min,
         kappa=kappa,
         oversampling=oversampling,
-        slices=(0, n_spo + 2 + HALF),
+        slices=(0, n_spo + 2 + reach + HALF),
     )
 
 
-def nearest_samples(space: ScaleSpace, keypoints: pd.DataFrame) -> NDArray[np.int64]:
-    """Nearest samples of a scale-space to keypoints.
+def places(space: ScaleSpace, keypoints: pd.DataFrame) -> NDArray[np.float64]:
+    """Where keypoints lie among the samples of a scale-space.
 
     Parameters
     ----------
@@ -62,19 +66,19 @@ def nearest_samples(space: ScaleSpace, keypoints: pd.DataFrame) -> NDArray[np.in
 
     Returns
     -------
-    ndarray of int, shape (n, 3)
-        Slice, row and column; they may lie outside the scale-space.
+    ndarray, shape (n, 3)
+        Slice, row and column, with fractions; they may lie outside the scale-space.
 
     Examples
     --------
     >>> space = scale_space(np.eye(12), camera_blur=0.5, n_spo=10, sigma_min=1.0)
-    >>> nearest_samples(space, pd.DataFrame({"y": [0.0], "x": [5.0], "sigma": [2.0]})).tolist()
-    [[10, 0, 39]]
+    >>> keypoints = pd.DataFrame({"y": [0.0], "x": [5.0], "sigma": [2.0]})
+    >>> places(space, keypoints).round(1).tolist()
+    [[10.0, 0.0, 39.1]]
     """
     sampling = space.sampling
     s = sampling.n_spo * np.log2(keypoints["sigma"] / sampling.sigma_min)
-    index = np.stack([s, keypoints["y"] / sampling.step, keypoints["x"] / sampling.step], axis=1)
-    return np.rint(index).astype(np.int64)
+    return np.stack([s, keypoints["y"] / sampling.step, keypoints["x"] / sampling.step], axis=1)
 
 
 def drawn(
@@ -108,7 +112,7 @@ def drawn(
     InputError
         If no stable or no unstable keypoint has room for a cube.
     """
-    centre = nearest_samples(space, keypoints)
+    centre = np.rint(places(space, keypoints)).astype(np.int64)
     fits = ((centre >= HALF) & (centre + HALF < np.array(space.shape))).all(axis=1)
     labels = label(keypoints["stability"], stable_above, unstable_below)
     groups = []
@@ -126,7 +130,10 @@ def drawn(
 
 
 def nearest_extrema(
-    space: ScaleSpace, centres: NDArray[np.int64], signs: NDArray[np.int64]
+    space: ScaleSpace,
+    keypoints: pd.DataFrame,
+    space_tolerance: float = SPACE_TOLERANCE,
+    scale_ratio: float = SCALE_RATIO,
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Extremum of the dense scale-space that belongs to each keypoint, if there is one.
 
@@ -134,33 +141,45 @@ def nearest_extrema(
     ----------
     space : ScaleSpace
         From `dense_scale_space`.
-    centres : ndarray of int, shape (n, 3)
-        Nearest samples to the keypoints.
-    signs : ndarray of int, shape (n,)
-        +1 for maxima, -1 for minima.
+    keypoints : DataFrame
+        Columns ``y, x, sigma`` in input pixels, and ``sign``: +1 for maxima, -1 for minima.
+    space_tolerance, scale_ratio : float
+        How far an extremum may be, see `keystab.duplicates.same`: the same in pixels and octaves
+        at every density.
 
     Returns
     -------
     samples : ndarray of int, shape (n, 3)
-        The discrete extremum of the same sign nearest to each centre, at most `SEARCH` samples
-        away along every axis; the centre itself where there is none.
+        The discrete extremum of the same sign that is nearest, with distances in units of the
+        limits; the sample nearest to the keypoint where there is none.
     found : ndarray of bool, shape (n,)
-        Whether there is one.
+        Whether there is one. Slices that the scale-space does not hold are not searched.
     """
-    samples, found = centres.copy(), np.zeros(len(centres), dtype=bool)
-    for k, (centre, sign) in enumerate(zip(centres, signs, strict=True)):
-        low = np.maximum(centre - SEARCH - 1, 0)
-        high = np.minimum(centre + SEARCH + 2, space.shape)
+    sampling = space.sampling
+    octaves, pixels = np.log2(scale_ratio), space_tolerance / sampling.step
+    # Positions of coarse samplings often lie exactly on the limit, where rounding would decide.
+    limits = np.array([sampling.n_spo * octaves, pixels, pixels]) * (1 + 1e-9)
+    exact = places(space, keypoints)
+    samples, found = np.rint(exact).astype(np.int64), np.zeros(len(exact), dtype=bool)
+    for k, (place, sign) in enumerate(zip(exact, keypoints["sign"], strict=True)):
+        # An extremum needs neighbours on both sides.
+        low = np.maximum(np.ceil(place - limits).astype(np.int64) - 1, 0)
+        high = np.minimum(np.floor(place + limits).astype(np.int64) + 2, space.shape)
         box = space.window(*(slice(int(i), int(j)) for i, j in zip(low, high, strict=True)))
         extrema = extrema_of_array(box, space.rounding)
         extrema = extrema[extrema[:, 3] == sign, :3] + low
         if len(extrema):
-            distance = ((extrema - centre) ** 2).sum(axis=1)
+            distance = (((extrema - place) / limits) ** 2).sum(axis=1)
             samples[k], found[k] = extrema[distance.argmin()], True
     return samples, found
 
 
-def cubes_around(space: ScaleSpace, keypoints: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+def cubes_around(
+    space: ScaleSpace,
+    keypoints: pd.DataFrame,
+    space_tolerance: float = SPACE_TOLERANCE,
+    scale_ratio: float = SCALE_RATIO,
+) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Cut one cube per keypoint; only the samples of the cubes are evaluated.
 
     Parameters
@@ -169,26 +188,30 @@ def cubes_around(space: ScaleSpace, keypoints: pd.DataFrame) -> tuple[pd.DataFra
         From `dense_scale_space`.
     keypoints : DataFrame
         From `drawn`.
+    space_tolerance, scale_ratio : float
+        See `nearest_extrema`.
 
     Returns
     -------
     panels : DataFrame
         ``panel`` (0, 1, ...), the columns of `keypoints`, ``extremum`` (whether the dense
         scale-space has one there), ``level`` (value of the surface to draw) and ``condition`` (of
-        the Hessian at the centre, per grid step).
+        the Hessian there or at the keypoint, per grid step).
     samples : DataFrame
         ``panel, k_s, k_y, k_x`` (offsets from the centre in samples) and ``value``.
 
     Notes
     -----
     A cube is centred on the keypoint's extremum in the dense scale-space, see `nearest_extrema`,
-    or on the keypoint itself where there is none. Its surface encloses the `SHARE` of its samples
-    with the most extreme values of the keypoint's sign, but always the centre.
+    or on the keypoint itself where there is none; where that leaves no room for a cube, as it can
+    at the borders and near the first scale, on the nearest sample that does. Its surface encloses
+    the `SHARE` of its samples with the most extreme values of the keypoint's sign, but always the
+    centre.
     """
     sign = keypoints["sign"].to_numpy(np.int64)
-    centres, found = nearest_extrema(space, nearest_samples(space, keypoints), sign)
-    centres = np.clip(centres, HALF, np.array(space.shape) - 1 - HALF)
-    _, hessian = quadratic_model(space.neighbourhoods(*centres.T))
+    nearest, found = nearest_extrema(space, keypoints, space_tolerance, scale_ratio)
+    _, hessian = quadratic_model(space.neighbourhoods(*nearest.T))
+    centres = np.clip(nearest, HALF, np.array(space.shape) - 1 - HALF)
     offsets = np.indices((2 * HALF + 1,) * 3).reshape(3, -1) - HALF
     levels, samples = [], []
     for panel, centre in enumerate(centres):

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pandas as pd
 
+from keystab import checks
 from keystab.dog_space import ScaleSpace, scale_space
 from keystab.errors import InputError
 from keystab.extrema import discrete_extrema
@@ -14,6 +15,7 @@ from keystab.refinement import (
     GRADIENT_COLUMNS,
     HESSIAN_COLUMNS,
     MOST_MODELS,
+    MOVES,
     accepted,
     positions,
     quadratic_model,
@@ -84,9 +86,9 @@ def detect_keypoints(
     -------
     DataFrame
         One row per keypoint: ``y, x, sigma`` in pixels, DoG ``value``, ``sign`` (+1 maximum, -1
-        minimum), ``octave``; the discrete extremum's ``s, row, column`` and its smallest absolute
-        ``difference`` to a neighbour; with `refine` also the number of ``models`` made. A
-        constant image gives no rows.
+        minimum), ``octave``; the discrete extremum's ``s, row, column`` in the grid of its octave
+        and its smallest absolute ``difference`` to a neighbour; with `refine` also the number of
+        ``models`` made. A constant image gives no rows.
 
     Raises
     ------
@@ -95,11 +97,12 @@ def detect_keypoints(
 
     Notes
     -----
-    Slices s = 1 .. n_spo of each octave are searched, so that octaves meet without overlap. Where
+    Slices s = 1 .. n_spo of each octave are reported, so that octaves meet without overlap. Where
     they meet, an extremum may be seen from both sides or from none, because the two grids differ.
-    Therefore both octaves are searched one slice beyond the seam; detections of one extremum on
-    both grids are recognised (same sign, within 1.5 samples of the coarser grid and one scale
-    step) and the refined scale on the finer grid decides which octave reports it.
+    Therefore, with more than one octave, both are searched one slice beyond the seam; detections of
+    one extremum on both grids are recognised (same sign, within 1.5 samples of the coarser grid and
+    one scale step) and the refined scale on the finer grid decides which octave reports it. The
+    first of several octaves can thus differ from a single one at its upper end.
 
     Examples
     --------
@@ -111,10 +114,14 @@ def detect_keypoints(
     >>> found.loc[found["value"].idxmin(), ["y", "x", "sigma"]].round(2).tolist()
     [20.0, 20.0, 1.78]
     """
-    if isinstance(n_oct, bool) or not isinstance(n_oct, (int, np.integer)) or n_oct < 1:
-        raise InputError(f"n_oct is {n_oct!r}, allowed is a whole number of at least 1")
-    if not max_iterations >= 1:
-        raise InputError(f"max_iterations is {max_iterations!r}, allowed is a number of at least 1")
+    checks.integer("n_oct", n_oct, least=1, most=40)
+    checks.limit("max_iterations", max_iterations, least=1)
+    checks.limit("max_offset", max_offset, above=0)
+    checks.integer("n_spo", n_spo, least=1)
+    if not isinstance(refine, (bool, np.bool_)):
+        raise InputError(f"refine is {refine!r}, allowed are True and False: change refine")
+    if move not in MOVES:
+        raise InputError(f"move is {move!r}, allowed are {' and '.join(MOVES)}: change move")
     octaves = []
     for octave in range(n_oct):
         # One slice more on the side of each neighbouring octave.

@@ -33,7 +33,7 @@ from keystab.sampling import OVERSAMPLINGS, Sampling, balanced_delta
 TILE = 128
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScaleSpace:
     """A sampled difference-of-Gaussians scale-space, evaluated on request.
 
@@ -84,11 +84,6 @@ class ScaleSpace:
         if self.oversampling == "spline":
             return np.ascontiguousarray(spline_source(self.image))
         return np.ascontiguousarray(cosine_source(self.image))
-
-    @cached_property
-    def single_source(self) -> np.ndarray:
-        """The source in single precision."""
-        return self.source.astype(np.float32)
 
     @cached_property
     def blurs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -160,8 +155,7 @@ class ScaleSpace:
         Parameters
         ----------
         along : list of Block
-            Operators of the y axis for the rows of each block. Their precision, single or double,
-            is that of the result.
+            Operators of the y axis for the rows of each block.
         columns : tuple of int
             First column and one past the last.
         slices : tuple of int
@@ -175,9 +169,7 @@ class ScaleSpace:
         lower, upper = (index[slice(*slices)] for index in self.blurs[1:])
         needed = np.unique([lower, upper])
         lower, upper = np.searchsorted(needed, lower), np.searchsorted(needed, upper)
-        precision = along[0].factors[0][1].dtype
-        source = self.source if precision == np.float64 else self.single_source
-        across = self.axes[1].block(*columns).as_type(precision)
+        across = self.axes[1].block(*columns)
         # Products along x with every source row that some block needs, shared by all blocks.
         factors = [block.factors[blur] for block in along for blur in needed]
         first = min(j for j, _ in factors)
@@ -185,10 +177,10 @@ class ScaleSpace:
         strips = []
         for blur in needed:
             j, matrix = across.factors[blur]
-            strips.append(source[first:last, j : j + matrix.shape[1]] @ matrix.T)
+            strips.append(self.source[first:last, j : j + matrix.shape[1]] @ matrix.T)
         tallest = max(block.factors[0][1].shape[0] for block in along)
-        blurred = np.empty((needed.size, tallest, strips[0].shape[1]), precision)
-        dog = np.empty((lower.size, tallest, strips[0].shape[1]), precision)
+        blurred = np.empty((needed.size, tallest, strips[0].shape[1]))
+        dog = np.empty((lower.size, tallest, strips[0].shape[1]))
         for block in along:
             height = block.factors[0][1].shape[0]
             for blur, strip, out in zip(needed, strips, blurred, strict=True):
@@ -236,7 +228,7 @@ class ScaleSpace:
         evaluate = spline_neighbourhoods if self.oversampling == "spline" else cosine_neighbourhoods
         return evaluate(self.source, self.axes, lower, upper, *indices)
 
-    @property
+    @cached_property
     def rounding(self) -> float:
         """Largest difference of two values of this scale-space that rounding can explain.
 
@@ -249,22 +241,6 @@ class ScaleSpace:
         else:
             amplitude = float(np.abs(self.image - self.image.mean()).max())
         return 2.0**-46 * amplitude
-
-    def error_bound(self, precision: type) -> float:
-        r"""Bound of the error of a difference of two samples of a block.
-
-        In single precision u = 2^-24: a sum of n products, of numbers that were themselves rounded,
-        errs by at most (n + 3) u times the sum of the absolute values of the products. Both axes
-        and two Gaussians for each of two samples take part, and a few roundings of the differences
-        themselves. In double precision it is half of `rounding`.
-        """
-        if precision == np.float64 or self.oversampling != "spline":
-            return self.rounding / 2
-        y_axis, x_axis = self.axes
-        assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
-        largest = float(np.abs(self.source).max()) * y_axis.gain * x_axis.gain
-        roundings = 4 * (y_axis.n_terms + x_axis.n_terms + 6) + 8
-        return 1.01 * roundings * 2.0**-24 * largest
 
     def attributes(self) -> dict[str, object]:
         """Everything needed to build this scale-space again from its image."""
@@ -345,11 +321,11 @@ def scale_space(
         delta_min = balanced_delta(n_spo, kappa, sigma_min)
     sampling = Sampling(
         (array.shape[0], array.shape[1]),
-        float(camera_blur),
+        camera_blur,
         n_spo,
-        float(delta_min),
-        float(sigma_min),
-        float(kappa),
+        delta_min,
+        sigma_min,
+        kappa,
         octave,
         slices,
     )

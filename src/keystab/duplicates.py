@@ -65,7 +65,7 @@ def same(
     Raises
     ------
     InputError
-        If a column is missing, a value is not finite, or a limit is out of range.
+        If a column is missing, a value is no finite number, or a limit is out of range.
 
     Examples
     --------
@@ -197,14 +197,12 @@ def _coordinates(
     match_sign: bool,
 ) -> NDArray[np.float64]:
     """Coordinates in units of the limits: same means no farther than 1 apart along every axis."""
-    if not space_tolerance > 0:
-        raise InputError(f"space_tolerance is {space_tolerance}, allowed is above 0: raise it")
-    if not scale_ratio > 1:
-        raise InputError(f"scale_ratio is {scale_ratio}, allowed is above 1: raise it")
+    _require_above("space_tolerance", space_tolerance, 0)
+    _require_above("scale_ratio", scale_ratio, 1)
     columns = {}
     for name in ("y", "x", "sigma", "sign") if match_sign else ("y", "x", "sigma"):
         try:
-            columns[name] = np.atleast_1d(np.asarray(detections[name], dtype=float))
+            columns[name] = np.atleast_1d(_real_numbers(detections[name], name))
         except KeyError:
             raise InputError(
                 f"the detections have no column {name!r}, needed are y, x, sigma (and sign where "
@@ -228,3 +226,29 @@ def _coordinates(
     if match_sign:
         axes.append(2 * np.sign(columns["sign"]))
     return np.stack(axes, axis=-1)
+
+
+def _require_above(name: str, value: float, limit: float) -> None:
+    try:
+        good = bool(value > limit)
+    except (TypeError, ValueError):  # text, arrays
+        good = False
+    if not good:
+        raise InputError(f"{name} is {value!r}, allowed are numbers above {limit}: raise it")
+
+
+def _real_numbers(column: Any, name: str) -> NDArray[np.float64]:
+    """Values of a column; text that looks like a number is refused, since it sorts as text."""
+    values = np.asarray(column)
+    kind = f"values of type {values.dtype}"
+    objects = values.flat if values.dtype.kind == "O" else ()
+    if values.dtype.kind in "US" or any(isinstance(v, (str, bytes)) for v in objects):
+        kind = "text"
+    elif values.dtype.kind in "biufO":  # objects: columns of pandas with missing values
+        try:
+            return values.astype(np.float64)
+        except (TypeError, ValueError):
+            pass
+    raise InputError(
+        f"column {name!r} holds {kind}, allowed are finite numbers: convert it or drop those rows"
+    )

@@ -4,11 +4,9 @@ A sample is an extremum when it lies strictly above, or strictly below, all of i
 (section 2.1 of the paper). The first and the last slice and the border samples of the grid have no
 complete neighbourhood and are never extrema.
 
-The search has two steps, as geometric predicates have. Blocks of samples are evaluated in single
-precision, which takes half the time, and everything is dropped that cannot be an extremum whatever
-the rounding errors are, for which there is a bound. The few samples that remain are decided in
-double precision, each from its own neighbourhood, so that the result depends neither on the first
-step nor on how the grid was cut into blocks.
+The search has two steps. Blocks of samples are evaluated and looked through; what may be an
+extremum there is decided from its own neighbourhood, so that the result depends neither on how the
+grid was cut into blocks nor on whether the values come from a store.
 """
 
 from __future__ import annotations
@@ -20,9 +18,8 @@ import numpy as np
 import threadpoolctl
 from numba import njit
 
-from keystab import memory
+from keystab import checks, memory
 from keystab.dog_space import ScaleSpace, ranges
-from keystab.errors import InputError
 from keystab.operators import Block
 from keystab.progress import progress
 
@@ -31,10 +28,6 @@ from keystab.progress import progress
 # column of blocks. All slices of a block stay in the cache of a core (22 Gaussians: 1.5 MB).
 BLOCK_ROWS = 32
 BLOCK_COLUMNS = 256
-
-# More candidates than this in a block: single precision cannot tell its samples apart, as in flat
-# areas, and the block is evaluated again in double precision.
-CROWD = 256
 
 # Rows whose operators are held at once: bounds the memory on large images.
 BAND_ROWS = 4096
@@ -67,7 +60,8 @@ def discrete_extrema(
     InputError
         If `epsilon` is negative or not finite, or `threads` is less than 1.
     """
-    _check(epsilon, threads)
+    checks.number("epsilon", epsilon, least=0)
+    checks.integer("threads", threads, least=1)
     height, width = space.sampling.shape
     memory.require(
         bytes_of_search(space, threads),
@@ -78,19 +72,12 @@ def discrete_extrema(
     found: list[np.ndarray] = []
     columns = list(ranges(1, space.shape[2] - 1, BLOCK_COLUMNS))
     tolerance = max(epsilon, space.rounding)
-    # The cosine series sums many large terms that cancel, which single precision cannot afford.
-    precision = np.float32 if space.oversampling == "spline" else np.float64
-    error = space.error_bound(precision)
-    space.source, space.single_source  # noqa: B018  made once, before threads share them
-
-    def rows_of(part: tuple[int, int]) -> Block:
-        return space.axes[0].block(part[0] - 1, part[1] + 1).as_type(precision)
-
+    space.source, space.axes, space.blurs  # noqa: B018  made once, before threads share them
     with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
         for top, bottom in ranges(1, space.shape[1] - 1, BAND_ROWS):
             rows = list(ranges(top, bottom, BLOCK_ROWS))
-            along = list(pool.map(rows_of, rows))
-            search = partial(_search_column, space, rows, along, tolerance, error)
+            along = list(pool.map(lambda r: space.axes[0].block(r[0] - 1, r[1] + 1), rows))
+            search = partial(_search_column, space, rows, along, tolerance)
             searches = pool.map(search, columns)
             what = f"extrema, n_spo {space.sampling.n_spo}"
             found += progress(searches, len(columns), what) if show_progress else searches
@@ -99,7 +86,7 @@ def discrete_extrema(
 
 
 def decided(space: ScaleSpace, candidates: np.ndarray, tolerance: float) -> np.ndarray:
-    """Decide which samples are extrema, each from its own neighbourhood in double precision.
+    """Decide which samples are extrema, each from its own neighbourhood.
 
     Parameters
     ----------
@@ -152,8 +139,7 @@ def extrema_of_array(
     dog : ndarray, shape (n_slices, n_rows, n_columns)
         Difference-of-Gaussians values, for example a tile with one sample around it.
     epsilon : float
-        See `discrete_extrema`. Where it is negative, all samples are found that may be extrema if
-        differences of values are wrong by as much; their signs mean nothing.
+        See `discrete_extrema`.
     offset : tuple of int
         Row and column of the first sample of `dog`, added to the result.
 
@@ -187,28 +173,16 @@ def _search_column(
     rows: list[tuple[int, int]],
     along: list[Block],
     tolerance: float,
-    error: float,
     columns: tuple[int, int],
 ) -> np.ndarray:
     """Extrema of one column of blocks; blocks have one sample around those searched."""
     first, last = columns[0] - 1, columns[1] + 1
-    candidates = []
     blocks = space.blocks(along, (first, last), (0, space.shape[0]))
-    for (top, bottom), dog in zip(rows, blocks, strict=True):
-        offset = (top - 1, first)
-        found = extrema_of_array(dog, tolerance - error, offset)
-        if len(found) > CROWD and dog.dtype != np.float64:
-            double = space.window(rows=slice(top - 1, bottom + 1), columns=slice(first, last))
-            found = extrema_of_array(double, tolerance - space.error_bound(np.float64), offset)
-        candidates.append(found)
+    candidates = [
+        extrema_of_array(dog, tolerance - space.rounding / 2, (top - 1, first))
+        for (top, _), dog in zip(rows, blocks, strict=True)
+    ]
     return decided(space, np.concatenate(candidates), tolerance)
-
-
-def _check(epsilon: float, threads: int) -> None:
-    if not (np.isfinite(epsilon) and epsilon >= 0):
-        raise InputError(f"epsilon is {epsilon}, allowed is a finite number of 0 or more")
-    if threads < 1:
-        raise InputError(f"threads is {threads}, allowed is a whole number of at least 1")
 
 
 @njit(cache=True, nogil=True)
@@ -220,10 +194,9 @@ def _scan(dog, epsilon, extrema):
     sample by sample.
     """
     n_slices, n_rows, n_columns = dog.shape
-    # Slightly tolerant, so that rounding of "value - epsilon" cannot hide what the second look
-    # would accept; of the type of the samples, so that nothing is converted.
-    tolerant = np.full(1, epsilon - 1e-9 * abs(epsilon), dog.dtype)
-    slack = tolerant[0]
+    # Slightly tolerant, so that rounding of "value - epsilon" hides nothing that counts: the bound
+    # is far above the last digit of the samples (see ScaleSpace.rounding).
+    slack = epsilon * (1 - 1e-9)
     count = 0
     for s in range(1, n_slices - 1):
         for y in range(1, n_rows - 1):

@@ -14,6 +14,7 @@ from typing import Any
 
 from keystab.errors import InputError
 from keystab.memory import in_words
+from keystab.pictures import picture_shape
 from keystab.sampling import Sampling, balanced_delta
 from keystab.settings import refuse
 from keystab.view_sets import per_view, view_shape
@@ -62,6 +63,8 @@ def setting_problems(settings: Settings) -> list[str]:
     else:
         problems += _scale_below_blur(settings)
     problems += _order(settings["comparison"], "comparison", "unstable_below", "stable_above")
+    if settings["comparison"]["last_scale"] is not None:
+        problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")
     problems += _order(settings["semigroup"], "semigroup", "sigma_from", "sigma_to")
     available = settings["samplings"]["n_spo"]
     unknown = [n_spo for n_spo in kept_n_spo(settings) if n_spo not in available]
@@ -206,37 +209,6 @@ def kept_n_spo(settings: Settings) -> list[int]:
     """
     kept = settings["keep_scale_spaces"]
     return list(settings["samplings"]["n_spo"]) if kept is True else list(kept or [])
-
-
-def picture_shape(path: Path) -> tuple[int, int]:
-    """Height and width of a picture, from the head of its file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or it is no picture.
-    """
-    if not path.is_file():
-        raise InputError(f"{path} does not exist: give the path of a picture")
-    try:
-        if path.suffix.lower() == ".npy":
-            import numpy as np
-
-            height, width = np.load(path, mmap_mode="r").shape[:2]
-        elif path.suffix.lower() in (".tif", ".tiff"):
-            import tifffile
-
-            with tifffile.TiffFile(path) as tiff:
-                page: Any = tiff.pages[0]
-                height, width = page.imagelength, page.imagewidth
-        else:
-            from PIL import Image
-
-            with Image.open(path) as picture:
-                width, height = picture.size
-    except Exception:  # decoders raise whatever they like
-        raise InputError(f"{path} is not a readable picture: give a PNG, TIFF or JPEG") from None
-    return int(height), int(width)
 
 
 def _free_bytes(folder: Path) -> int:

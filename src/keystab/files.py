@@ -4,11 +4,42 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["written_whole"]
+from keystab.errors import InputError
+
+__all__ = ["check_writable", "written_whole"]
+
+
+def check_writable(path: str | os.PathLike[str], suffixes: Sequence[str] = ()) -> None:
+    """Raise unless a file can be written; to be asked before anything expensive is done.
+
+    Parameters
+    ----------
+    path : path
+        File to be written later. It and its folder need not exist.
+    suffixes : sequence of str, optional
+        Formats to choose from, such as ``.csv``, in lower case; any by default.
+
+    Raises
+    ------
+    InputError
+        If the suffix is none of `suffixes`, a folder is in the place of the file, or its folder
+        cannot be made or written to.
+
+    Examples
+    --------
+    >>> check_writable("keypoints.csv", (".csv", ".parquet"))
+    """
+    path = Path(path)
+    if suffixes and path.suffix.lower() not in suffixes:
+        allowed = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
+        raise InputError(f"{path}: cannot write '{path.suffix}'; use {allowed}")
+    if os.path.isdir(path):
+        raise InputError(f"{path} is a folder; give a file name")
+    _check_folder(path)
 
 
 @contextmanager
@@ -16,9 +47,10 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Let a block write a file or a folder that appears at `path` only once it is complete.
 
     The block receives a temporary sibling of `path`, with the same suffix, hidden by a leading
-    dot. When the block ends normally the sibling replaces `path` in one rename; when it raises, or
+    dot. When the block ends normally the sibling replaces `path` by renaming; when it raises, or
     is interrupted, the sibling is deleted and `path` is left as it was. A process killed outright
-    leaves the hidden sibling behind, never a half-written `path`.
+    leaves hidden siblings behind, never a half-written `path`. A file replaces only a file, and a
+    folder only a folder.
 
     Parameters
     ----------
@@ -29,6 +61,14 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     ------
     pathlib.Path
         The temporary sibling. It does not exist yet.
+
+    Raises
+    ------
+    InputError
+        If the folder of `path` cannot be made or written to, or the block wrote a file where
+        there is a folder, or the other way round.
+    OSError
+        As the block raised it, but naming `path` instead of the temporary sibling.
 
     Examples
     --------
@@ -42,21 +82,65 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     '42'
     """
     target = Path(path)
+    _check_folder(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".part-{os.getpid()}-{target.name}")
-    _remove(part)
     try:
-        yield part
-        if target.is_dir():  # a folder cannot be renamed onto a folder that holds files
-            old = target.with_name(f".old-{os.getpid()}-{target.name}")
-            _remove(old)
-            target.rename(old)
-            part.rename(target)
-            _remove(old)
-        else:
-            part.replace(target)
-    finally:
-        _remove(part)
+        try:
+            _remove(part)
+            yield part
+            _put(part, target)
+        finally:
+            _remove(part)
+    except OSError as error:
+        _name(target, part, error)
+        raise
+
+
+def _put(part: Path, target: Path) -> None:
+    """Rename a complete file or folder to where it belongs."""
+    if not target.is_dir():
+        if part.is_dir() and target.exists():
+            raise InputError(f"{target} is a file; give the name of a folder")
+        part.replace(target)
+        return
+    part.stat()  # raises if the block wrote nothing
+    if not part.is_dir():
+        raise InputError(f"{target} is a folder; give a file name")
+    # A folder cannot be renamed onto a folder that holds files.
+    old = target.with_name(f".old-{os.getpid()}-{target.name}")
+    _remove(old)
+    target.rename(old)
+    try:
+        part.rename(target)
+    except BaseException:
+        old.rename(target)
+        raise
+    _remove(old)
+
+
+def _check_folder(path: Path) -> None:
+    """Raise unless the folder of a path can be written to, or made where it does not exist."""
+    folder = path.absolute().parent
+    while not os.path.lexists(folder):
+        folder = folder.parent
+    if not os.path.isdir(folder):
+        raise InputError(f"{path}: {folder} is no folder; give another place")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: the folder {folder} cannot be written to; give another place")
+
+
+def _name(target: Path, part: Path, error: OSError) -> None:
+    """Make an error speak of the file that was asked for; of a full disk it names no file."""
+
+    def named(text: object) -> str:
+        return str(text).replace(str(part), str(target))
+
+    if error.errno is None:
+        error.args = tuple(map(named, error.args))
+    else:
+        error.strerror = named(error.strerror)
+        error.filename = str(target) if error.filename is None else named(error.filename)
 
 
 def _remove(path: Path) -> None:

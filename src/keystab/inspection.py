@@ -71,7 +71,7 @@ def _scale_space(space: xr.Dataset, path: Path) -> list[str]:
 
 def _views(views: xr.Dataset, path: Path) -> list[str]:
     n = views.sizes["view"]
-    lines = [f"{path}: {n} simulated view{'s' * (n != 1)} of {views['image'].dtype}"]
+    lines = [f"{path}: {_counted(n, 'simulated view')} of {views['image'].dtype}"]
     for name, words in (
         ("height", "height {} pixels"),
         ("width", "width {} pixels"),
@@ -91,20 +91,26 @@ def _views(views: xr.Dataset, path: Path) -> list[str]:
 
 def _table(table: pd.DataFrame, path: Path) -> list[str]:
     n = len(table)
-    keypoints = {"y", "x", "sigma"} <= set(table.columns)
-    lines = [f"{path}: table of {n} {'keypoint' if keypoints else 'row'}{'s' * (n != 1)}"]
-    if "sign" in table and keypoints:
-        lines.append(f"  {(table['sign'] > 0).sum()} maxima, {(table['sign'] < 0).sum()} minima")
-    for name in table.columns:
-        column = table[name]
+    numeric = {name for name, column in table.items() if column.dtype.kind in "biuf" or not n}
+    keypoints = {"y", "x", "sigma"} <= numeric
+    lines = [f"{path}: table of {_counted(n, 'keypoint' if keypoints else 'row')}"]
+    if keypoints and "sign" in numeric:
+        maxima, minima = int((table["sign"] > 0).sum()), int((table["sign"] < 0).sum())
+        lines.append(
+            f"  {_counted(maxima, 'maximum', 'maxima')}, {_counted(minima, 'minimum', 'minima')}"
+        )
+    for name, column in table.items():
         if column.dtype.kind in "iuf" and column.notna().any():
             span = f"{column.min():.6g} to {column.max():.6g}"
         else:
-            values = column.nunique()
-            span = f"{values} value{'s' * (values != 1)}"
+            span = _counted(column.nunique(), "value")
         missing = int(column.isna().sum())
         lines.append(f"  {name}: {span}" + (f", {missing} missing" if missing else ""))
     return lines
+
+
+def _counted(n: int, one: str, more: str | None = None) -> str:
+    return f"{n} {one if n == 1 else more or one + 's'}"
 
 
 def _other(attributes: Mapping[str, Any]) -> list[str]:

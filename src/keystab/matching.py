@@ -67,8 +67,8 @@ def unique_keypoints(
     Raises
     ------
     InputError
-        If a column is missing, a value is not finite, a limit is out of range, or the
-        limits are so wide that nearly everything is the same.
+        If a column is missing, a value is no finite number, sets have no common order, a limit
+        is out of range, or the limits are so wide that nearly everything is the same.
 
     Notes
     -----
@@ -233,7 +233,13 @@ def set_names(
             f"the detections have no column {set_column!r} that names their sets: add it, or name "
             "another one with set_column"
         )
-    return sorted(detections[set_column].unique())
+    try:
+        return sorted(detections[set_column].unique())
+    except TypeError:
+        raise InputError(
+            f"column {set_column!r} names sets by values that have no common order, such as "
+            "numbers beside text: make them all numbers or all text"
+        ) from None
 
 
 def set_codes(
@@ -248,8 +254,8 @@ def set_codes(
     if (codes < 0).any():
         unknown = detections[set_column].iloc[int(np.argmin(codes))]
         raise InputError(
-            f"column {set_column!r} holds {unknown!r}, which is not among the {len(names)} sets "
-            "given: add it to `sets` or leave those rows out"
+            f"column {set_column!r} holds {unknown!r}, which is none of the sets given "
+            f"({len(names)}): add it to `sets` or leave those rows out"
         )
     return codes
 

@@ -10,13 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from keystab.operators import (
-    AxisOperator,
-    CosineAxis,
-    SplineAxis,
-    blurred_spline_rows,
-    column_range,
-)
+from keystab.operators import AxisOperator, CosineAxis, SplineAxis, fill_rows
 
 # Candidates handled at once in cosine mode: bounds the memory of their cosines.
 _BATCH = 256
@@ -37,8 +31,8 @@ def spline_neighbourhoods(
     cubes = np.zeros((s.size, 3, 3, 3))
     _spline_cubes(
         source,
-        (y_axis.n_samples, y_axis.taps, y_axis.reach, y_axis.splines),
-        (x_axis.n_samples, x_axis.taps, x_axis.reach, x_axis.splines),
+        y_axis.rows,
+        x_axis.rows,
         y_axis.stride,
         lower,
         upper,
@@ -85,29 +79,19 @@ def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, 
     y_rows = np.empty((3, source.shape[0]))
     x_rows = np.empty((3, source.shape[1]))
     for k in range(s.size):
+        top, left = (row[k] - 1) * stride, (column[k] - 1) * stride
         for a in range(3):
             for pair in range(2):
                 blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
-                y_first, y_last = _rows_around(row[k], stride, blur, y_axis, y_rows)
-                x_first, x_last = _rows_around(column[k], stride, blur, x_axis, x_rows)
+                y_first, height = fill_rows(y_axis, blur, top, stride, y_rows)
+                x_first, width = fill_rows(x_axis, blur, left, stride, x_rows)
                 _add_products(
-                    source[y_first:y_last, x_first:x_last],
-                    y_rows[:, : y_last - y_first],
-                    x_rows[:, : x_last - x_first],
+                    source[y_first : y_first + height, x_first : x_first + width],
+                    y_rows[:, :height],
+                    x_rows[:, :width],
                     1.0 if pair == 0 else -1.0,
                     cubes[k, a],
                 )
-
-
-@njit(cache=True, nogil=True)
-def _rows_around(index, stride, blur, axis, rows):
-    """Rows index - 1 .. index + 1 of the blurred spline, and the columns that they span."""
-    n_samples, taps, reaches, splines = axis
-    start, reach = (index - 1) * stride, reaches[blur]
-    first, last = column_range(start - reach, start + 2 * stride + reach, n_samples, splines)
-    rows[:, : last - first] = 0.0
-    blurred_spline_rows(start, stride, taps[blur], reach, splines, first, rows[:, : last - first])
-    return first, last
 
 
 @njit(cache=True, nogil=True)

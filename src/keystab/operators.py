@@ -23,7 +23,6 @@ from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 import scipy.fft
 import scipy.ndimage
 from numba import njit
@@ -33,6 +32,12 @@ from keystab import cosine
 # Kernel values below this do not reach the last digit of a blurred image in [0, 1]; rounding of the
 # transform that makes the kernel stays below it.
 _NEGLIGIBLE = 3e-17
+
+# Where the band limit of the grid shows, rows of L ring: what they hold beyond the distance at
+# which less than this is left of their sum (which is 1) is cut off, and the sum restored; but only
+# where rows become so many times shorter, because on small images whole rows cost little.
+_NEGLIGIBLE_RINGING = 1e-13
+_WORTH_CUTTING = 12
 
 # From this blur on, in samples, the band limit of the grid lies below the last digit: the kernel is
 # a sampled Gaussian and ends where that does, at 8.6 standard deviations.
@@ -65,14 +70,6 @@ class Block(NamedTuple):
     expand: np.ndarray | None
     factors: list[tuple[int, np.ndarray]]
 
-    def as_type(self, precision: npt.DTypeLike) -> Block:
-        """Return the same block in another floating-point precision."""
-        common, factors = self
-        return Block(
-            None if common is None else common.astype(precision, copy=False),
-            [(first, matrix.astype(precision, copy=False)) for first, matrix in factors],
-        )
-
 
 class SplineAxis:
     """Cubic B-spline oversampling followed by the cosine-domain Gaussian of the fine grid.
@@ -98,40 +95,23 @@ class SplineAxis:
     def __init__(
         self, n_samples: int, n_pixels: int, delta_min: float, stride: int, blurs: np.ndarray
     ) -> None:
-        self.n_samples = n_samples
-        self.delta_min = delta_min
         self.stride = stride
+        self.n_columns = n_pixels + 2 * _PADDING
         kernels = [cosine_domain_kernel(n_samples, blur / delta_min) for blur in blurs]
-        self.reach = np.array([kernel.size - 1 for kernel in kernels])
-        self.taps = two_sided(kernels, n_samples)
-        self.splines = mirrored_splines(
-            *spline_rows(n_samples, n_pixels, delta_min), self.taps.shape[1] // 2
-        )
-
-    @property
-    def n_terms(self) -> int:
-        """Most columns of a row that are not zero."""
-        n_pixels = self.splines.column.max() + 4
-        return int(min(n_pixels, 2 * self.reach.max() * self.delta_min + 6))
-
-    @property
-    def gain(self) -> float:
-        """Largest sum of absolute values of a row: weights of a B-spline add up to one."""
-        return float(np.abs(self.taps).sum(axis=1).max())
+        taps = two_sided(kernels, n_samples)
+        splines = mirrored_splines(*spline_rows(n_samples, n_pixels, delta_min), taps.shape[1] // 2)
+        reach = np.array([kernel.size - 1 for kernel in kernels])
+        rings = reach > _LOCAL_REACH * blurs / delta_min + 1
+        dense = SplineRows(n_samples, taps, reach, splines, *_no_tables(blurs.size))
+        self.rows = with_tables(dense, np.flatnonzero(rings), self.n_columns)
 
     def block(self, start: int, stop: int) -> Block:
         """See `AxisOperator.block`."""
         factors = []
-        first_sample, last_sample = start * self.stride, (stop - 1) * self.stride
-        for taps, reach in zip(self.taps, self.reach, strict=True):
-            first, last = column_range(
-                first_sample - reach, last_sample + reach, self.n_samples, self.splines
-            )
-            rows = np.zeros((stop - start, last - first))
-            blurred_spline_rows(
-                first_sample, self.stride, taps, int(reach), self.splines, first, rows
-            )
-            factors.append((first, rows))
+        room = np.empty((stop - start, self.n_columns))
+        for blur in range(self.rows.reach.size):
+            first, width = fill_rows(self.rows, blur, start * self.stride, self.stride, room)
+            factors.append((first, room[:, :width].copy()))
         return Block(None, factors)
 
 
@@ -336,6 +316,122 @@ def column_range(low, high, n_samples, splines):
     if high >= n_samples:
         first = min(first, max(2 * n_samples - 1 - high, 0))
     return splines.column[first + margin], splines.column[last + margin] + 4
+
+
+class SplineRows(NamedTuple):
+    """What the rows of L of a spline axis are made of, for compiled code.
+
+    Attributes
+    ----------
+    n_samples : int
+        Samples of the first octave's grid.
+    taps, reach : ndarray
+        Kernel of every blur, both sides, and its largest distance.
+    splines : MirroredSplines
+        Weights of the samples.
+    table : ndarray of int, shape (n_blurs,)
+        Which table holds the rows of a blur; -1 where they are made when needed.
+    first : ndarray of int, shape (n_tables, n_samples)
+        First column of each row in a table.
+    value : ndarray, shape (n_tables, n_samples, width)
+        Entries of each row in a table.
+    """
+
+    n_samples: int
+    taps: np.ndarray
+    reach: np.ndarray
+    splines: MirroredSplines
+    table: np.ndarray
+    first: np.ndarray
+    value: np.ndarray
+
+
+def _no_tables(n_blurs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    empty = np.empty((0, 0), dtype=np.int64), np.empty((0, 0, 0))
+    return (np.full(n_blurs, -1), *empty)
+
+
+def with_tables(rows: SplineRows, ringing: np.ndarray, n_columns: int) -> SplineRows:
+    """Tabulate the rows of blurs whose kernel rings, as far as the rows themselves ring.
+
+    The kernel's tail alternates from sample to sample, and splines hardly hold that frequency: of
+    a row, much less is left at a distance than of the kernel. Where some tens of columns are all
+    that counts, they are computed once; where the whole row counts, it is made when needed. What is
+    cut off changes samples by some 1e-13 of the image's range, and by up to some 1e-11 where the
+    border is nearer than the cut.
+    """
+    reaches = {int(blur): _ringing_reach(rows, int(blur), n_columns) for blur in ringing}
+    kept = [blur for blur, r in reaches.items() if _WORTH_CUTTING * (2 * r + 4) < n_columns]
+    if not kept:
+        return rows
+    width = 2 * max(reaches[blur] for blur in kept) + 4
+    margin = (rows.splines.column.size - rows.n_samples) // 2
+    column = rows.splines.column[margin : margin + rows.n_samples]
+    first = np.clip(column + 2 - width // 2, 0, n_columns - width)
+    value = np.empty((len(kept), rows.n_samples, width))
+    for number, blur in enumerate(kept):
+        for start in range(0, rows.n_samples, 256):
+            part = slice(start, min(start + 256, rows.n_samples))
+            full = _full_rows(rows, blur, part.start, part.stop, n_columns)
+            cut = np.take_along_axis(full, first[part, None] + np.arange(width), axis=1)
+            value[number, part] = cut / cut.sum(axis=1, keepdims=True)
+    table = rows.table.copy()
+    table[kept] = np.arange(len(kept))
+    return rows._replace(table=table, first=np.tile(first, (len(kept), 1)), value=value)
+
+
+def _ringing_reach(rows: SplineRows, blur: int, n_columns: int) -> int:
+    """Distance in columns beyond which less than `_NEGLIGIBLE_RINGING` of a row is left.
+
+    Seen at the middle of the axis; columns at the ends, whose mirrored splines have a kink, are
+    left out: what they add is of the order of the last digit.
+    """
+    middle = rows.n_samples // 2
+    row = np.abs(_full_rows(rows, blur, middle, middle + 1, n_columns)[0])
+    row[:8] = row[-8:] = 0.0
+    distance = np.abs(np.arange(n_columns) - row.argmax())
+    left = np.bincount(distance, weights=row)[::-1].cumsum()[::-1]
+    return (
+        int(np.argmax(left < _NEGLIGIBLE_RINGING)) if left[-1] < _NEGLIGIBLE_RINGING else n_columns
+    )
+
+
+def _full_rows(rows: SplineRows, blur: int, start: int, stop: int, n_columns: int) -> np.ndarray:
+    """Rows `start` to `stop` with all columns."""
+    room = np.empty((stop - start, n_columns))
+    first, width = fill_rows(rows, blur, start, 1, room)
+    full = np.zeros_like(room)
+    full[:, first : first + width] = room[:, :width]
+    return full
+
+
+@njit(cache=True, nogil=True)
+def fill_rows(rows, blur, start, stride, out):
+    """Write rows ``start, start + stride, ...`` of L into the first columns of `out`.
+
+    Returns
+    -------
+    first, width : int
+        Column of the source that the first column of `out` stands for, and how many are written.
+    """
+    last_sample = start + (out.shape[0] - 1) * stride
+    table = rows.table[blur]
+    if table >= 0:
+        wide = rows.value.shape[2]
+        first = rows.first[table, start]
+        width = rows.first[table, last_sample] + wide - first
+        out[:, :width] = 0.0
+        for row in range(out.shape[0]):
+            sample = start + row * stride
+            shift = rows.first[table, sample] - first
+            out[row, shift : shift + wide] = rows.value[table, sample]
+        return first, width
+    reach = rows.reach[blur]
+    first, last = column_range(start - reach, last_sample + reach, rows.n_samples, rows.splines)
+    width = last - first
+    out[:, :width] = 0.0
+    blurred_spline_rows(start, stride, rows.taps[blur], reach, rows.splines, first, out[:, :width])
+    return first, width
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keystab.errors import InputError
-from keystab.files import written_whole
+from keystab.files import check_writable, written_whole
 
-__all__ = ["check_writable", "pixel_digest", "read_picture", "write_picture"]
+__all__ = ["FORMATS", "picture_shape", "pixel_digest", "read_picture", "write_picture"]
+
+#: Suffixes of the files that pictures are written to.
+FORMATS = (".png", ".tif", ".tiff", ".npy")
 
 #: Weights of red, green and blue in the grey value (ITU-R BT.601 luma).
 LUMA = (0.299, 0.587, 0.114)
 
-_READABLE = "PNG, TIFF, JPEG or .npy"
+_READABLE = "PNG, JPEG, TIFF or .npy"
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _PNG_COLOUR_TYPES = (b"\2", b"\4", b"\6")  # RGB, grey with alpha, RGB with alpha
+_NPY_SIGNATURE = b"\x93NUMPY"
 _TIFF_SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 
@@ -36,8 +43,10 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     Parameters
     ----------
     path : path
-        A PNG, TIFF, JPEG or NumPy (.npy) file; other formats that Pillow knows are tried. Arrays
-        in .npy files have the shape (height, width) or (height, width, channels).
+        A PNG, JPEG, TIFF or NumPy (.npy) file; other formats that Pillow knows are tried. The
+        content decides, whatever the suffix. Arrays in .npy files have the shape (height, width)
+        or (height, width, channels). Previews beside the picture (JPEG with MPO, reduced pages of
+        a TIFF) do not count.
 
     Returns
     -------
@@ -47,9 +56,10 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     Raises
     ------
     InputError
-        If the file is missing or unreadable, holds several pictures, holds signed integers, NaN
-        or infinities, or is a PNG in colour with 16 bits per channel, which the decoder at hand
-        would cut down to 8 bits.
+        If the file is missing or unreadable, holds several pictures (pages or frames of an
+        animation), holds signed integers, NaN or infinities, is a floating-point TIFF in which 0
+        is white, or is a PNG in colour with 16 bits per channel, which the decoder at hand would
+        cut down to 8 bits.
 
     Examples
     --------
@@ -62,12 +72,43 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     """
     path = Path(path)
     grey = _grey(_decode(path), path)
-    if not np.isfinite(grey).all():
-        raise InputError(
-            f"{path}: {np.count_nonzero(~np.isfinite(grey))} of {grey.size} pixels are NaN or "
-            "infinite; replace them by finite values"
-        )
+    _require_finite(grey, path)
     return grey
+
+
+def picture_shape(path: str | os.PathLike[str]) -> tuple[int, int]:
+    """Height and width of a picture, from the head of its file.
+
+    Parameters
+    ----------
+    path : path
+        A picture that `read_picture` accepts.
+
+    Returns
+    -------
+    (int, int)
+        Height and width in pixels. The pixels themselves are not looked at.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, no picture or several of them; see `read_picture`.
+    """
+    path = Path(path)
+    head = _head(path)
+    with _one_line(path):
+        if head.startswith(_NPY_SIGNATURE):
+            shape: tuple[int, ...] = np.load(path, mmap_mode="r", allow_pickle=False).shape
+            _count_channels(shape, path)
+            return shape[0], shape[1]
+        if head.startswith(_TIFF_SIGNATURES):
+            import tifffile
+
+            with tifffile.TiffFile(path) as tiff:
+                page = _only_page(tiff, path)
+                return int(page.imagelength), int(page.imagewidth)
+        _, (width, height) = _pillow_mode_and_size(path)
+        return height, width
 
 
 def pixel_digest(path: str | os.PathLike[str]) -> str:
@@ -112,12 +153,19 @@ def write_picture(u: NDArray[np.floating[Any]], path: str | os.PathLike[str]) ->
     Raises
     ------
     InputError
-        If the suffix is none of these.
+        If the suffix is none of these, no file can be written there (see
+        `keystab.files.check_writable`), or `u` is no grey picture of finite values.
     """
     path = Path(path)
-    check_writable(path)
+    check_writable(path, FORMATS)
     suffix = path.suffix.lower()
-    u = np.asarray(u, dtype=np.float64)
+    u = np.asarray(u)
+    if u.dtype.kind not in "biuf":
+        raise InputError(f"{path}: values of type {u.dtype} are no grey values; give real numbers")
+    if u.ndim != 2 or u.size == 0:
+        raise InputError(f"{path}: shape {u.shape} is no grey picture; give (height, width)")
+    u = u.astype(np.float64)
+    _require_finite(u, path)
     with written_whole(path) as part:
         if suffix == ".npy":
             np.save(part, u, allow_pickle=False)
@@ -132,26 +180,32 @@ def write_picture(u: NDArray[np.floating[Any]], path: str | os.PathLike[str]) ->
             tifffile.imwrite(part, u.astype(np.float32), photometric="minisblack")
 
 
-def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise unless `write_picture` knows the format that a suffix asks for.
-
-    Parameters
-    ----------
-    path : path
-        File to be written later; asked before anything expensive is done.
-
-    Raises
-    ------
-    InputError
-        If the suffix is none of .png, .tif, .tiff and .npy.
-    """
-    suffix = Path(path).suffix
-    if suffix.lower() not in {".png", ".tif", ".tiff", ".npy"}:
-        raise InputError(f"{path}: cannot write '{suffix}'; use .png, .tif, .tiff or .npy")
+def _require_finite(u: NDArray[np.floating[Any]], path: Path) -> None:
+    bad = np.count_nonzero(~np.isfinite(u))
+    if bad:
+        raise InputError(
+            f"{path}: {bad} of {u.size} pixels {'is' if bad == 1 else 'are'} NaN or infinite; "
+            "replace them by finite values"
+        )
 
 
 def _decode(path: Path) -> NDArray[Any]:
     """Decode the samples as stored: (height, width) or (height, width, channels)."""
+    head = _head(path)
+    with _one_line(path):
+        if head.startswith(_NPY_SIGNATURE):
+            pixels = np.load(path, allow_pickle=False)
+        elif head.startswith(_TIFF_SIGNATURES):
+            pixels = _decode_tiff(path)
+        else:
+            pixels = _decode_by_pillow(path, _pillow_mode_and_size(path)[0])
+    if pixels.size == 0:
+        raise InputError(f"{path}: the picture has no pixels (shape {pixels.shape})")
+    return pixels
+
+
+def _head(path: Path) -> bytes:
+    """First bytes of a file, which tell its format."""
     try:
         with path.open("rb") as file:
             head = file.read(26)
@@ -165,51 +219,86 @@ def _decode(path: Path) -> NDArray[Any]:
             f"{path}: a PNG with colour or alpha and 16 bits per channel would lose its lower 8 "
             "bits; save it as 16-bit grey PNG or 16-bit TIFF"
         )
+    return head
+
+
+@contextmanager
+def _one_line(path: Path) -> Iterator[None]:
+    """Turn whatever a decoder raises into an `InputError`."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a large picture is no reason to warn a user
-            if head.startswith(b"\x93NUMPY"):
-                pixels = np.load(path, allow_pickle=False)
-            elif head.startswith(_TIFF_SIGNATURES):
-                pixels = _decode_tiff(path)
-            else:
-                pixels = _decode_by_pillow(path)
+            yield
     except InputError:
         raise
     except Exception as error:  # decoders raise whatever they like
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: not a readable picture ({_READABLE}): {reason[:120]}") from None
-    if pixels.size == 0:
-        raise InputError(f"{path}: the picture has no pixels (shape {pixels.shape})")
-    return pixels
+
+
+def _only_page(tiff: Any, path: Path) -> Any:
+    """Page of a TIFF that holds one picture; thumbnails and other reduced pages do not count."""
+    pages = [page for page in tiff.pages if not page.is_reduced]
+    series = tiff.series[0]  # ImageJ lists one page for a stack of pictures
+    n_pictures = max(len(pages), math.prod(series.shape) // max(1, math.prod(pages[0].shape)))
+    if n_pictures > 1:
+        raise InputError(f"{path}: the TIFF holds {n_pictures} pictures; keep one")
+    return pages[0]
 
 
 def _decode_tiff(path: Path) -> NDArray[Any]:
     import tifffile
 
     with tifffile.TiffFile(path) as tiff:
-        n_pictures = len(tiff.pages)
-        if n_pictures > 1 and len(tiff.series[0].pages) != 1:
-            raise InputError(f"{path}: the TIFF holds {n_pictures} pictures; keep one")
-        page = tiff.pages.first
+        page = _only_page(tiff, path)
         photometric = getattr(page.photometric, "name", "")
-        if photometric in {"MINISBLACK", "MINISWHITE", "RGB"}:
-            try:
-                pixels = page.asarray()
-            except ValueError:  # a compression that needs a package we do not ask for
-                return _decode_by_pillow(path)
-            if page.axes == "SYX":  # one plane per channel
-                pixels = np.moveaxis(pixels, 0, -1)
-            if photometric == "MINISWHITE":
-                pixels = np.iinfo(pixels.dtype).max - pixels
-            return pixels
-    return _decode_by_pillow(path)
+        if photometric not in {"MINISBLACK", "MINISWHITE", "RGB"}:
+            return _decode_by_pillow(path, _pillow_mode(path))
+        if photometric == "MINISWHITE" and page.dtype is not None and page.dtype.kind == "f":
+            raise InputError(
+                f"{path}: in this TIFF of floats 0 is white (MINISWHITE) and nothing says what is "
+                "black; save it with 0 as black (MINISBLACK)"
+            )
+        try:
+            pixels = page.asarray()
+        except ValueError:  # a compression that needs a package we do not ask for
+            return _decode_by_pillow(path, _pillow_mode(path))
+        if page.axes == "SYX":  # one plane per channel
+            pixels = np.moveaxis(pixels, 0, -1)
+        if photometric == "MINISWHITE" and pixels.dtype.kind in {"b", "u"}:
+            pixels = ~pixels  # the largest value minus the sample
+        return pixels
 
 
-def _decode_by_pillow(path: Path) -> NDArray[Any]:
+def _pillow_mode(path: Path) -> str:
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        return picture.mode
+
+
+def _pillow_mode_and_size(path: Path) -> tuple[str, tuple[int, int]]:
+    """Colour mode, width and height of a file that holds one picture."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as picture:
+            n_pictures = getattr(picture, "n_frames", 1)
+            # The further pictures of a JPEG (MPO) are previews and depth maps.
+            if n_pictures > 1 and picture.format != "MPO":
+                raise InputError(
+                    f"{path}: the {picture.format} file holds {n_pictures} pictures; keep one"
+                )
+            return picture.mode, picture.size
+    except UnidentifiedImageError:
+        raise InputError(
+            f"{path}: its content is none of PNG, JPEG, TIFF and .npy; give such a picture"
+        ) from None
+
+
+def _decode_by_pillow(path: Path, mode: str) -> NDArray[Any]:
     import imageio.v3 as iio
 
-    mode = iio.immeta(path, plugin="pillow", index=0).get("mode")
     # Pillow would hand over ink densities (CMYK) or Lab as if they were colours.
     convert = {"mode": "RGB"} if mode in {"CMYK", "YCbCr", "LAB", "HSV"} else {}
     return np.asarray(iio.imread(path, plugin="pillow", index=0, **convert))
@@ -229,15 +318,20 @@ def _grey(pixels: NDArray[Any], path: Path) -> NDArray[np.float64]:
             f"{path}: samples of type {pixels.dtype} have no agreed white; "
             "use unsigned integers or floats"
         )
-    channels = 1 if pixels.ndim == 2 else pixels.shape[-1]
-    if pixels.ndim not in (2, 3) or channels > 4:
-        raise InputError(
-            f"{path}: shape {pixels.shape} is no picture; expected (height, width) or "
-            "(height, width, 1 to 4 channels)"
-        )
+    channels = _count_channels(pixels.shape, path)
     if pixels.ndim == 3 and channels < 3:  # grey, or grey and alpha
         pixels = pixels[..., 0]
     if pixels.ndim == 2:
         return pixels.astype(np.float64) / white
     red, green, blue = (pixels[..., c].astype(np.float64) for c in range(3))
     return (LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue) / white
+
+
+def _count_channels(shape: tuple[int, ...], path: Path) -> int:
+    channels = shape[-1] if len(shape) == 3 else 1
+    if len(shape) not in (2, 3) or channels > 4:
+        raise InputError(
+            f"{path}: shape {shape} is no picture; expected (height, width) or "
+            "(height, width, 1 to 4 channels)"
+        )
+    return channels

@@ -9,11 +9,10 @@ neighbours; its extremum lies at ``alpha = -H^{-1} g`` grid steps. It is accepte
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pandas as pd
 
+from keystab import checks
 from keystab.dog_space import ScaleSpace
 from keystab.errors import InputError
 from keystab.sampling import Sampling
@@ -242,7 +241,5 @@ def _step(alpha: np.ndarray, max_offset: float, move: str) -> np.ndarray:
 def _check(move: str, max_offset: float, max_models: int) -> None:
     if move not in MOVES:
         raise InputError(f"move is {move!r}, allowed are {' and '.join(MOVES)}: change move")
-    if not (max_offset > 0):
-        raise InputError(f"max_offset is {max_offset}, allowed is a number above 0")
-    if isinstance(max_models, bool) or not (max_models >= 1) or math.isnan(max_models):
-        raise InputError(f"max_models is {max_models}, allowed is a whole number of at least 1")
+    checks.limit("max_offset", max_offset, above=0)
+    checks.integer("max_models", max_models, least=1)

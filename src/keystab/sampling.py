@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from keystab import checks
 from keystab.errors import InputError
 
 OVERSAMPLINGS = ("spline", "cosine")
@@ -17,6 +18,11 @@ OVERSAMPLINGS = ("spline", "cosine")
 # Beyond this many samples in one axis an index times delta_min loses digits that matter, and no
 # machine that we know of finishes the octave.
 _MOST_SAMPLES_PER_AXIS = 2**22
+_MOST_SCALES = 10_000
+
+# Scales that differ by less than this share are the same: a blur of 1.1 in single precision is the
+# blur of 1.1.
+_SAME = 1e-6
 
 
 def balanced_delta(n_spo: int, kappa: float = 2 ** (1 / 3), sigma_min: float = 1.1) -> float:
@@ -82,14 +88,21 @@ class Sampling:
 
     def __post_init__(self) -> None:
         _check_scales(self.n_spo, self.sigma_min, self.kappa)
-        _require(_is_number(self.camera_blur, 0), "camera_blur", self.camera_blur, "0 or more")
-        _require(_is_positive(self.delta_min), "delta_min", self.delta_min, "above 0")
-        if self.sigma_min < self.camera_blur:
+        checks.integer("octave", self.octave, least=0, most=40)
+        for name in ("sigma_min", "kappa", "camera_blur", "delta_min"):
+            above = None if name == "camera_blur" else 0
+            least = 0 if name == "camera_blur" else None
+            # Plain floats, whatever kind of number was given: they go into stores as they are.
+            value = checks.number(name, getattr(self, name), least, above)
+            object.__setattr__(self, name, value)
+        if self.slices is not None and not self.slices[0] < self.slices[1]:
+            raise InputError(f"slices are {self.slices}, allowed is a first and a later last one")
+        if self.sigma_min < self.camera_blur * (1 - _SAME):
             raise InputError(
                 f"sigma_min is {self.sigma_min:g} but the image already has a blur of "
                 f"{self.camera_blur:g} px: give a sigma_min of at least {self.camera_blur:g}"
             )
-        if self.sigma[0] < self.camera_blur * (1 - 1e-12):
+        if self.sigma[0] < self.camera_blur * (1 - _SAME):
             raise InputError(
                 f"slice {self.first_slice} has the scale {self.sigma[0]:.4g} px, below the camera "
                 f"blur of {self.camera_blur:g} px: begin at a later slice"
@@ -176,27 +189,6 @@ class Sampling:
 
 
 def _check_scales(n_spo: int, sigma_min: float, kappa: float) -> None:
-    _require(_is_integer(n_spo, 1), "n_spo", n_spo, "a whole number of at least 1")
-    _require(_is_positive(sigma_min), "sigma_min", sigma_min, "above 0")
-    _require(_is_positive(kappa) and kappa > 1, "kappa", kappa, "a ratio above 1")
-
-
-def _require(holds: bool, name: str, given: object, allowed: str) -> None:
-    if not holds:
-        raise InputError(f"{name} is {given!r}, allowed is {allowed}: change {name}")
-
-
-def _is_integer(value: object, least: int) -> bool:
-    return (
-        isinstance(value, (int, np.integer)) and not isinstance(value, bool) and int(value) >= least
-    )
-
-
-def _is_number(value: object, least: float) -> bool:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        return False
-    return math.isfinite(float(value)) and float(value) >= least
-
-
-def _is_positive(value: object) -> bool:
-    return _is_number(value, 0.0) and float(value) > 0  # type: ignore[arg-type]
+    checks.integer("n_spo", n_spo, least=1, most=_MOST_SCALES)
+    checks.number("sigma_min", sigma_min, above=0)
+    checks.number("kappa", kappa, above=1)

@@ -39,7 +39,6 @@ def stored_extrema(
     """
     _require_same(store, space)
     tolerance = max(epsilon, space.rounding)
-    error = space.error_bound(np.float64)
     n_rows = store.shape[1]
     found = [np.empty((0, 4), dtype=np.int64)]
     above = np.empty((store.shape[0], 0, store.shape[2]))  # last two rows of the tiles before
@@ -47,7 +46,9 @@ def stored_extrema(
     for top in progress(starts, len(starts), f"extrema of {n_rows} stored rows"):
         rows = store.window(rows=slice(top, min(top + TILE, n_rows)))
         rows = np.concatenate([above, rows], axis=1)
-        found.append(extrema_of_array(rows, tolerance - error, (top - above.shape[1], 0)))
+        found.append(
+            extrema_of_array(rows, tolerance - space.rounding / 2, (top - above.shape[1], 0))
+        )
         above = rows[:, -2:].copy()
     extrema = decided(space, np.concatenate(found), tolerance)
     return extrema[np.lexsort((extrema[:, 2], extrema[:, 1], extrema[:, 0]))]

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from keystab.errors import InputError
-from keystab.files import written_whole
+from keystab.files import check_writable, written_whole
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["check_writable", "read_table", "to_csv", "write_table"]
+__all__ = ["FORMATS", "read_table", "to_csv", "write_table"]
+
+#: Suffixes of the files that tables are written to and read from.
+FORMATS = (".csv", ".parquet")
 
 
 def write_table(table: pd.DataFrame, path: str | os.PathLike[str]) -> None:
@@ -33,7 +36,8 @@ def write_table(table: pd.DataFrame, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        If the suffix is neither.
+        If the suffix is neither, or no file can be written there; see
+        `keystab.files.check_writable`.
 
     Examples
     --------
@@ -44,9 +48,9 @@ def write_table(table: pd.DataFrame, path: str | os.PathLike[str]) -> None:
     'n_spo,delta_min\n3,0.30000000000000004\n'
     """
     path = Path(path)
-    suffix = _suffix(path)
+    check_writable(path, FORMATS)
     with written_whole(path) as part:
-        if suffix == ".csv":
+        if path.suffix.lower() == ".csv":
             part.write_text(to_csv(table), encoding="utf-8", newline="")
         else:
             import pyarrow as pa
@@ -91,7 +95,9 @@ def read_table(path: str | os.PathLike[str], columns: Sequence[str] | None = Non
         If the file is missing, is no such table, or lacks one of `columns`.
     """
     path = Path(path)
-    suffix = _suffix(path)
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        raise InputError(f"{path}: a table ends in .csv or .parquet, not in '{path.suffix}'")
     if not path.is_file():
         raise InputError(f"{path}: no such table; give the path of a .csv or .parquet file")
     try:
@@ -110,22 +116,6 @@ def read_table(path: str | os.PathLike[str], columns: Sequence[str] | None = Non
     return table[list(columns)]
 
 
-def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise unless `write_table` knows the format that a suffix asks for.
-
-    Parameters
-    ----------
-    path : path
-        File to be written later; asked before anything expensive is done.
-
-    Raises
-    ------
-    InputError
-        If the suffix is neither .csv nor .parquet.
-    """
-    _suffix(Path(path))
-
-
 def _read_csv(path: Path) -> pd.DataFrame:
     import pandas as pd
 
@@ -141,10 +131,3 @@ def _read_parquet(path: Path) -> pd.DataFrame:
     from pyarrow import parquet
 
     return parquet.read_table(path).to_pandas()
-
-
-def _suffix(path: Path) -> str:
-    suffix = path.suffix.lower()
-    if suffix not in {".csv", ".parquet"}:
-        raise InputError(f"{path}: a table ends in .csv or .parquet, not in '{suffix}'")
-    return suffix

@@ -13,6 +13,9 @@ from keystab.errors import InputError
 
 __all__ = ["ViewSpec", "effective_blur", "to_reference", "to_view"]
 
+#: Lengths in reference pixels from which on float64 tells no half pixels apart.
+_FARTHEST = 2.0**52
+
 
 @dataclass(frozen=True)
 class ViewSpec:
@@ -39,7 +42,8 @@ class ViewSpec:
     Raises
     ------
     InputError
-        If a value is out of its range, or there is noise without a seed.
+        If a value is out of its range, there is noise without a seed, or the blur or the farthest
+        position is 2**52 reference pixels or more, where float64 tells no half pixels apart.
 
     Examples
     --------
@@ -63,9 +67,13 @@ class ViewSpec:
         _check_number("step", self.step, "a number of reference pixels above 0", least=0.0)
         if self.step == 0:
             raise InputError("step is 0; give a number of reference pixels above 0")
-        if len(self.shift) != 2:
-            raise InputError(f"shift is {self.shift}; give two numbers of view pixels: down, right")
-        for component in self.shift:
+        try:
+            down, right = self.shift
+        except (TypeError, ValueError):
+            raise InputError(
+                f"shift is {self.shift!r}; give two numbers of view pixels: down, right"
+            ) from None
+        for component in (down, right):
             _check_number("shift", component, "finite numbers of view pixels: down, right")
         try:
             height, width = (operator.index(size) for size in self.shape)
@@ -73,7 +81,36 @@ class ViewSpec:
             height = width = 0
         if height < 1 or width < 1:
             raise InputError(f"shape is {self.shape}; give a height and a width of 1 pixel or more")
-        if self.noise > 0 and self.seed is None:
+        self._check_lengths()
+        self._check_seed()
+
+    def _check_lengths(self) -> None:
+        step = float(self.step)
+        if not float(self.blur) * step < _FARTHEST:
+            raise InputError(
+                f"camera blur is {self.blur:g} and step {self.step:g}, a blur of 2**52 reference "
+                "pixels or more; give a smaller blur or step"
+            )
+        # No shape is too large for the comparison, though one may be for a float.
+        sizes = (min(n, 2**53) for n in self.shape)
+        reach = max(abs(float(d)) + n for d, n in zip(self.shift, sizes, strict=True))
+        if not reach * step < _FARTHEST:
+            raise InputError(
+                f"shift is {self.shift}, shape {self.shape} and step {self.step:g}: the view "
+                "reaches 2**52 reference pixels away or more; give smaller ones"
+            )
+
+    def _check_seed(self) -> None:
+        if self.seed is not None:
+            parts = self.seed if isinstance(self.seed, tuple) else (self.seed,)
+            try:
+                for part in parts:
+                    part if isinstance(part, str) else operator.index(part)
+            except TypeError:
+                raise InputError(
+                    f"seed is {self.seed!r}; give a whole number, text, or a tuple of them"
+                ) from None
+        elif self.noise > 0:
             raise InputError(
                 "noise without a seed would differ from run to run; "
                 "give a seed that says what the noise is for"
@@ -190,7 +227,7 @@ def _centre(shape: tuple[int, int]) -> tuple[float, float]:
 def _check_number(name: str, value: float, allowed: str, least: float = -math.inf) -> None:
     try:
         good = math.isfinite(value) and value >= least
-    except TypeError:
+    except (TypeError, ValueError, OverflowError):  # text, arrays, integers beyond any float
         good = False
     if not good:
         raise InputError(f"{name} is {value!r}; give {allowed}")

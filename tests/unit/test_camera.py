@@ -1,6 +1,7 @@
 """The simulated camera against closed forms and symmetries."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -218,15 +219,32 @@ def test_effective_blur_is_what_a_blurred_reference_gives():
         ({"shape": 5}, "shape is 5"),
         ({"shift": (1.0, math.nan)}, "shift is nan"),
         ({"shift": (1.0, 2.0, 3.0)}, "shift is (1.0, 2.0, 3.0)"),
+        ({"shift": 1}, "shift is 1;"),
+        ({"shift": "a"}, "shift is 'a'"),
+        ({"blur": 10**400}, "camera blur is 1000"),
+        ({"blur": 1e308, "step": 1e10}, "camera blur is 1e+308 and step 1e+10"),
+        ({"blur": 1e200}, "camera blur is 1e+200"),
+        ({"step": 1e308}, "step 1e+308"),
+        ({"blur": 0.0, "step": 1e308}, "the view reaches"),
+        ({"shift": (0.0, -1e17)}, "the view reaches"),
+        ({"shape": (10**400, 2)}, "the view reaches"),
+        ({"noise": 0.1, "seed": 1.5}, "seed is 1.5"),
+        ({"seed": ("set", None)}, "seed is ('set', None)"),
+        ({"seed": [1]}, "seed is [1]"),
+        ({"reference": "a.png"}, "the reference is 'a.png'"),
+        ({"reference": Path("a.png")}, "a.png"),
+        ({"reference": np.ones((8, 8), dtype=complex)}, "complex128 values"),
+        ({"reference": [["a", "b"]]}, "<U1 values"),
+        ({"reference": [[1.0], [1.0, 2.0]]}, "the reference is no array"),
         ({"rotation": math.inf}, "rotation is inf"),
         ({"noise": -1.0}, "noise is -1.0"),
         ({"noise": 0.1}, "seed"),
     ],
 )
 def test_bad_values_get_one_line_that_names_them(change, word):
-    good = {"blur": 1.0, "step": 2.0, "shape": (4, 4)}
+    good = {"reference": np.ones((8, 8)), "blur": 1.0, "step": 2.0, "shape": (4, 4)}
     with pytest.raises(InputError) as raised:
-        simulate_view(np.ones((8, 8)), **(good | change))
+        simulate_view(**(good | change))
     assert word in str(raised.value)
     assert "\n" not in str(raised.value)
 
@@ -235,3 +253,10 @@ def test_a_view_too_large_for_memory_is_refused_beforehand(monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: 10**9)
     with pytest.raises(InputError, match=r"view of 100000 x 100000 pixels needs about 240 GB"):
         simulate_view(np.ones((8, 8)), 1.0, 2.0, (100_000, 100_000))
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_largest_lengths_still_give_numbers():
+    for blur, step, rotation in ((0.0, 1e14, 0.0), (0.0, 1e14, 0.3), (1e3, 1e12, 0.3)):
+        view = simulate_view(picture((8, 8)), blur, step, (4, 4), rotation=rotation)
+        assert np.isfinite(view).all()

@@ -116,7 +116,10 @@ BLUR = "--camera-blur 0.8"
         ("detect PICTURE --camera-blur wide", "invalid float value: 'wide'"),
         (f"detect PICTURE {BLUR} --move far", "invalid choice: 'far'"),
         (f"detect gone.png {BLUR}", "gone.png: no such file"),
-        (f"detect PICTURE {BLUR} -o found.txt", "found.txt: a table ends in"),
+        (
+            f"detect PICTURE {BLUR} -o found.txt",
+            "found.txt: cannot write '.txt'; use .csv or .parquet",
+        ),
         (f"detect PICTURE {BLUR} --n-spo 0", "n_spo is 0"),
         (f"detect PICTURE {BLUR} --n-oct 0", "n_oct is 0"),
         (f"detect PICTURE {BLUR} --n-oct 40", "fewer octaves"),
@@ -136,7 +139,8 @@ BLUR = "--camera-blur 0.8"
         ("simulate PICTURE view.png --blur 1 --step 1000", "smaller step or a shape"),
         ("simulate PICTURE view.png --blur 1 --step 2 --shape 0 4", "shape is (0, 4)"),
         ("simulate PICTURE view.png --blur 1 --step 2 --noise 0.1", "seed"),
-        ("simulate PICTURE PICTURE/view.png --blur 1 --step 2", "blob.npy"),
+        ("simulate PICTURE PICTURE/view.png --blur 1 --step 2", "blob.npy is no folder"),
+        (f"detect PICTURE {BLUR} -o PICTURE/found.csv", "blob.npy is no folder"),
         ("inspect gone", "gone: no such file"),
         ("inspect PICTURE", "ends in .csv or .parquet"),
         ("inspect .", "no store of keystab here"),
@@ -155,6 +159,33 @@ def test_bad_input_gets_status_2_and_one_line(
     assert words in err
     assert err.endswith("\n") and err.count("\n") == 1
     assert [p.name for p in tmp_path.iterdir()] == ["blob.npy"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [f"detect PICTURE {BLUR} -o folder.csv", "simulate PICTURE folder.npy --blur 1 --step 2"],
+)
+def test_a_folder_in_the_place_of_the_output_survives(
+    picture, tmp_path, monkeypatch, capsys, command
+):
+    monkeypatch.chdir(tmp_path)
+    for name in ("folder.csv", "folder.npy"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "precious").write_text("kept")
+    monkeypatch.setattr("keystab.pictures.read_picture", None)  # refused before it is read
+    assert cli.main(command.replace("PICTURE", str(picture)).split()) == 2
+    assert "is a folder; give a file name\n" in capsys.readouterr().err
+    for name in ("folder.csv", "folder.npy"):
+        assert (tmp_path / name / "precious").read_text() == "kept"
+
+
+def test_one_keypoint_is_singular(picture, tmp_path, monkeypatch, capsys):
+    found = detect_keypoints(read_picture(picture), 0.8, n_oct=2)
+    for n, words in ((0, "0 keypoints in"), (1, "1 keypoint in"), (2, "2 keypoints in")):
+        table = pd.concat([found[:1]] * n) if n else found[:0]
+        monkeypatch.setattr("keystab.detection.detect_keypoints", lambda *_, t=table, **__: t)
+        assert cli.main(["detect", str(picture), "--camera-blur", "0.8"]) == 0
+        assert words in capsys.readouterr().err
 
 
 def test_too_large_for_memory_is_refused_beforehand(picture, monkeypatch, capsys):

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from keystab.comparison import comparable
-from keystab.cubes import HALF, cubes_around, dense_scale_space, drawn, nearest_samples
+from keystab.cubes import HALF, cubes_around, dense_scale_space, drawn, nearest_extrema, places
 from keystab.errors import InputError
 from keystab.sampling_tables import change_counts, long_matches, match_samplings, summary
 from keystab.stages._inputs import positions_of_matches
@@ -28,6 +28,10 @@ def test_margin_and_range_include_their_limits():
     table.loc[5, "step_sigma"] = np.inf
     kept = comparable(table, (11, 11), sigma_min=1.0, first_scale=2.0, border=3.0)
     assert kept.tolist() == [True, False, True, False, False, True]
+    kept = comparable(table, (11, 11), 1.0, first_scale=2.0, border=3.0, last_scale=2.0)
+    assert kept.tolist() == [True, False, True, False, False, False]
+    kept = comparable(table, (11, 11), 1.0, first_scale=1.0, border=3.0, last_scale=1.999)
+    assert not kept.any()
 
 
 def test_new_and_lost_refer_to_the_neighbouring_sampling():
@@ -67,6 +71,38 @@ def blob_space():
     return dense_scale_space(blob, 0.8, 40, 1.1, KAPPA, "cosine")
 
 
+@pytest.mark.parametrize("n_spo", [16, 40, 60])
+def test_an_extremum_is_sought_as_far_away_at_every_density(n_spo):
+    y, x = np.mgrid[:41, :41]
+    blob = np.exp(-((y - 20) ** 2 + (x - 20) ** 2) / (2 * (1.9**2)))
+    space = dense_scale_space(blob, 0.8, n_spo, 1.1, KAPPA, "cosine")
+    sigma = np.sqrt((1.9**2 - 0.8**2) / KAPPA)
+    keypoints = pd.DataFrame(
+        [(0.9, 0, 1), (-1.1, 0, 1), (0, -0.9, 1.33), (0, 1.1, 1), (0, 0, 1.5), (0, 0, 0.75)],
+        columns=["y", "x", "sigma"],
+    )
+    keypoints = keypoints * [1, 1, sigma] + [20, 20, 0]
+    _, found = nearest_extrema(space, keypoints.assign(sign=-1))
+    assert found.tolist() == [True, False, True, False, False, True]
+    _, found = nearest_extrema(space, keypoints.assign(sign=-1), 1.2, 1.6)
+    assert found.all()
+    assert not nearest_extrema(space, keypoints.assign(sign=1))[1].any()
+
+
+def test_cubes_have_room_around_extrema_above_the_octave():
+    y, x = np.mgrid[:61, :61]
+    blob = np.exp(-((y - 30) ** 2 + (x - 30) ** 2) / (2 * 3.1**2))
+    space = dense_scale_space(blob, 0.8, 20, 1.1, KAPPA, "cosine")
+    sigma = np.sqrt((3.1**2 - 0.8**2) / KAPPA)  # 2.67, beyond the octave's end at 2.2
+    keypoint = pd.DataFrame({"keypoint": [0], "y": [30.0], "x": [30.0], "sigma": [2.2]})
+    panels, samples = cubes_around(space, keypoint.assign(stability=0.1, sign=-1))
+    assert panels["extremum"].item()
+    middle = samples[(samples[["k_s", "k_y", "k_x"]] == 0).all(axis=1)]["value"].item()
+    assert middle == samples["value"].min()
+    s, _, _ = nearest_extrema(space, keypoint.assign(sign=-1))[0][0]
+    assert space.sampling.sigma_min * 2 ** (s / 20) == pytest.approx(sigma, rel=0.02)
+
+
 def test_cube_of_a_blob_is_centred_on_its_extremum(blob_space):
     sigma = np.sqrt((1.9**2 - 0.8**2) / KAPPA)  # standard deviation before the camera / sqrt(kappa)
     keypoint = pd.DataFrame({"keypoint": [0], "y": [20.0], "x": [20.0], "sigma": [sigma]})
@@ -85,7 +121,7 @@ def test_cube_without_an_extremum_is_centred_on_the_keypoint(blob_space):
     panels, samples = cubes_around(blob_space, keypoint.assign(stability=0.1, sign=1))
     assert not panels["extremum"].item()
     middle = samples[(samples[["k_s", "k_y", "k_x"]] == 0).all(axis=1)]["value"].item()
-    centre = nearest_samples(blob_space, keypoint)[0]
+    centre = np.rint(places(blob_space, keypoint)).astype(int)[0]
     there = blob_space.neighbourhoods(*centre[:, None])[0, 1, 1, 1]
     assert middle == pytest.approx(there, rel=1e-12)
 
@@ -105,7 +141,7 @@ def test_cubes_are_drawn_only_where_they_fit(blob_space):
     chosen = drawn(keypoints, blob_space, 0.8, 0.2, per_group=10)
     assert chosen["group"].tolist() == ["stable"] * 10 + ["unstable"] * 10
     assert (chosen["stability"] == [1.0] * 10 + [0.1] * 10).all()
-    centre = nearest_samples(blob_space, chosen)
+    centre = np.rint(places(blob_space, chosen))
     assert (centre >= HALF).all() and (centre + HALF < blob_space.shape).all()
     again = drawn(keypoints.sample(frac=1, random_state=3), blob_space, 0.8, 0.2, per_group=500)
     assert set(chosen["keypoint"]) <= set(again["keypoint"])

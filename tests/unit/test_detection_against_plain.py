@@ -144,3 +144,12 @@ def test_unlimited_refinement_accepts_every_regular_model(texture):
     discrete = detect_keypoints(texture, 1.1, 5, refine=False)
     assert len(first) == len(discrete)
     assert (first["models"] == 1).all()
+
+
+def test_candidates_are_decided_one_by_one(texture):
+    space = scale_space(texture, 1.1, 8)
+    found = extrema.discrete_extrema(space)
+    beside = found + [0, 0, 1, 0]
+    candidates = np.concatenate([beside, found * [1, 1, 1, 0]])
+    decided = extrema.decided(space, candidates, space.rounding)
+    np.testing.assert_array_equal(decided, found)

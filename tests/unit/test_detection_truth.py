@@ -208,6 +208,26 @@ def test_no_extremum_is_lost_or_doubled_at_seams(n_spo, refine):
         assert abs(error) < (0.25 if refine else 0.75)
 
 
+@pytest.mark.parametrize("n_spo", [3, 5])
+def test_rows_do_not_grow_with_the_image(n_spo):
+    """At coarse samplings the kernel of the grid rings; on large images its rows are cut."""
+    delta = balanced_delta(n_spo, KAPPA, 1.1)
+    widths, rows = [], []
+    for n in (700, 1400):
+        blurs = scale_space(np.zeros((4, n)), 1.1, n_spo).blurs[0]
+        axis = SplineAxis(int(n / delta), n, delta, 1, blurs)
+        widths.append([matrix.shape[1] for _, matrix in axis.block(600, 640).factors])
+        rows.append(axis)
+    assert np.abs(np.subtract(*widths)).max() <= 4 and max(widths[1]) < 120
+    whole = SplineAxis(int(350 / delta), 350, delta, 1, blurs)
+    for blur in range(blurs.size):
+        first, cut = rows[0].block(300, 340).factors[blur]
+        other, full = whole.block(300, 340).factors[blur]
+        kept = full[:, first - other : first - other + cut.shape[1]] if first >= other else full
+        at = max(other - first, 0)
+        assert np.abs(cut[:, at : at + kept.shape[1]] - kept).max() < 1e-12
+
+
 def test_octaves_continue_each_other():
     image = blobs((64, 80), 11)
     one = detect_keypoints(image, 1.1, 5)
@@ -268,6 +288,17 @@ def test_a_tolerance_keeps_exactly_the_extrema_that_exceed_it():
         ({"n_oct": 0}, "n_oct"),
         ({"n_oct": 9}, "octave"),
         ({"threads": 0}, "threads"),
+        ({"threads": 1.5}, "threads"),
+        ({"camera_blur": None}, "camera_blur"),
+        ({"camera_blur": "0.5"}, "camera_blur"),
+        ({"n_spo": None}, "n_spo"),
+        ({"n_spo": 10**9, "delta_min": 0.5}, "n_spo"),
+        ({"delta_min": "1"}, "delta_min"),
+        ({"epsilon": "0"}, "epsilon"),
+        ({"max_offset": None}, "max_offset"),
+        ({"max_iterations": True}, "max_iterations"),
+        ({"move": "far", "refine": False}, "nearest and unit_step"),
+        ({"refine": "no"}, "True and False"),
     ],
     ids=str,
 )

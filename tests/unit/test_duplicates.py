@@ -142,3 +142,30 @@ def test_refuses_before_memory_runs_out():
     n = 25_000  # all in one place: 312 million pairs, 5 GB
     with pytest.raises(InputError, match="pairs"):
         pairs_within(pd.DataFrame({"y": np.zeros(n), "x": np.zeros(n), "sigma": np.ones(n)}))
+
+
+@pytest.mark.parametrize(
+    ("change", "limits", "words"),
+    [
+        ({"y": ["top", "low"]}, {}, "column 'y' holds text"),
+        ({"y": ["1.5", "10"]}, {}, "column 'y' holds text"),
+        ({"x": np.array([1j, 2])}, {}, "column 'x' holds values of type complex128"),
+        ({"x": [1.0, "2"]}, {}, "column 'x' holds text"),
+        ({"sigma": pd.array([1.0, None])}, {}, "column 'sigma' holds"),
+        ({}, {"space_tolerance": "1"}, "space_tolerance is '1'"),
+        ({}, {"space_tolerance": None}, "space_tolerance is None"),
+        ({}, {"scale_ratio": [1.4, 2.0]}, "scale_ratio is [1.4, 2.0]"),
+        ({}, {"scale_ratio": np.array([1.4, 2.0])}, "scale_ratio is array"),
+    ],
+)
+def test_what_is_no_number_gets_one_line(change, limits, words):
+    table = pd.DataFrame({"y": [0.0, 1.0], "x": [0.0, 1.0], "sigma": [1.1, 1.2]} | change)
+    with pytest.raises(InputError) as raised:
+        pairs_within(table, **limits)
+    assert words in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_nullable_columns_are_numbers():
+    table = pd.DataFrame({"y": [0.0, 0.5], "x": 0.0, "sigma": 1.1})
+    np.testing.assert_array_equal(pairs_within(table.convert_dtypes()), pairs_within(table))
+    assert len(pairs_within(table.astype(object))) == 1

@@ -5,13 +5,11 @@ from __future__ import annotations
 import copy
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 
 from keystab import feasibility, settings
 from keystab.errors import InputError
-from keystab.pictures import write_picture
 from keystab.view_sets import per_view, view_shape, view_specs
 
 ROOT = Path(__file__).parents[2]
@@ -44,6 +42,7 @@ def test_shipped_settings_are_feasible(path):
         ([("sets.still.blur", [1.0, 1.1])], "sets.still has several views"),
         ([("sets.examples.step", [20, 14])], "sets.examples has lists of different lengths (blur 3, step 2)"),
         ([("comparison.unstable_below", 0.9)], "comparison.unstable_below is 0.9, allowed is a number below comparison.stable_above = 0.8"),
+        ([("comparison.last_scale", 1.2)], "comparison.first_scale is 1.2599210498948732, allowed is a number below comparison.last_scale = 1.2"),
         ([("semigroup.sigma_to", 0.05)], "semigroup.sigma_from is 0.1, allowed is a number below semigroup.sigma_to = 0.05"),
         ([("keep_scale_spaces", [3, 40])], "keep_scale_spaces has 40, allowed are members of samplings.n_spo = [3, 4,"),
         ([("figures", "empty")], "results, figures and logs name the same folder"),
@@ -70,13 +69,6 @@ def test_stores_that_exist_need_no_more_room(tmp_path, monkeypatch):
     (tmp_path / "scale_space").mkdir()
     (tmp_path / "scale_space" / "n3.sha256").touch()
     assert not feasibility.picture_problems(config, ROOT)
-
-
-@pytest.mark.parametrize("suffix", [".png", ".tif", ".npy"])
-def test_shape_is_read_from_the_head_of_a_picture(tmp_path, suffix):
-    path = tmp_path / f"picture{suffix}"
-    write_picture(np.linspace(0, 1, 6 * 9).reshape(6, 9), path)
-    assert feasibility.picture_shape(path) == (6, 9)
 
 
 def test_views_of_a_set():

@@ -163,7 +163,7 @@ def test_other_endings_and_unwritable_folders_are_refused(drawn, tmp_path):
     with pytest.raises(InputError, match="written as .pdf or .png"):
         save(drawn[2], tmp_path / "fig2.svg")
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="is no folder; give another place"):
         save(drawn[2], tmp_path / "file" / "fig2.png")
 
 

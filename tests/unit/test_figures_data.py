@@ -105,6 +105,10 @@ def test_figure_3_needs_a_grid_and_a_curve():
     table = figure_tables.fig3()["fig3"]
     with pytest.raises(InputError, match="no row is marked balanced"):
         fig3.draw({"fig3": table.assign(balanced=False)})
+    with pytest.raises(
+        InputError, match="no sampling has an extremum, so there is nothing to draw"
+    ):
+        fig3.draw({"fig3": table.assign(n_extrema=0, median_condition=np.nan)})
     with pytest.raises(InputError, match="there is no grid"):
         fig3.draw({"fig3": table[table["balanced"]]})
 

@@ -1,8 +1,12 @@
 """Files appear whole or not at all."""
 
+import errno
+import os
+
 import pytest
 
-from keystab.files import written_whole
+from keystab.errors import InputError
+from keystab.files import check_writable, written_whole
 
 
 def test_failure_leaves_what_was_there(tmp_path):
@@ -45,3 +49,93 @@ def test_a_block_that_writes_nothing_keeps_the_old_file(tmp_path):
     with pytest.raises(FileNotFoundError), written_whole(target):
         pass
     assert target.read_text() == "old"
+
+
+def test_a_file_never_replaces_a_folder(tmp_path):
+    target = tmp_path / "store.csv"
+    target.mkdir()
+    (target / "precious").write_text("kept")
+    with pytest.raises(InputError, match=r"store\.csv is a folder; give a file name"):
+        check_writable(target)
+    with (
+        pytest.raises(InputError, match=r"store\.csv is a folder; give a file name"),
+        written_whole(target) as part,
+    ):
+        part.write_text("new")
+    assert (target / "precious").read_text() == "kept"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_folder_never_replaces_a_file(tmp_path):
+    target = tmp_path / "result"
+    target.write_text("kept")
+    with pytest.raises(InputError, match="result is a file"), written_whole(target) as part:
+        part.mkdir()
+    assert target.read_text() == "kept"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_folder_stays_when_its_successor_is_missing_or_cannot_be_put(tmp_path, monkeypatch):
+    target = tmp_path / "store"
+    target.mkdir()
+    (target / "precious").write_text("kept")
+    with pytest.raises(FileNotFoundError), written_whole(target):
+        pass
+    rename = type(target).rename
+
+    def refuse(path, other):
+        if path.name.startswith(".part"):
+            raise OSError(errno.EIO, "broken", str(path))
+        return rename(path, other)
+
+    monkeypatch.setattr(type(target), "rename", refuse)
+    with pytest.raises(OSError, match="broken"), written_whole(target) as part:
+        part.mkdir()
+    assert (target / "precious").read_text() == "kept"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize(
+    "raised",
+    [
+        lambda part: OSError(errno.ENOSPC, "No space left on device"),
+        lambda part: PermissionError(errno.EACCES, "Permission denied", str(part)),
+        lambda part: OSError(errno.EIO, f"cannot open '{part}'", str(part / "chunk")),
+        lambda part: OSError(f"cannot open '{part}'"),
+    ],
+)
+def test_errors_name_the_target(tmp_path, raised):
+    target = tmp_path / "result.csv"
+    with pytest.raises(OSError) as caught, written_whole(target) as part:
+        error = raised(part)
+        raise error
+    assert caught.value is error  # of the same type and with the same number
+    assert str(target) in str(caught.value) and ".part" not in str(caught.value)
+    assert caught.value.errno is None or str(target) in caught.value.filename
+
+
+def test_a_name_too_long_is_named_as_it_was_given(tmp_path):
+    target = tmp_path / ("x" * 250 + ".csv")
+    with pytest.raises(OSError) as caught, written_whole(target) as part:
+        part.write_text("never")
+    assert caught.value.errno == errno.ENAMETOOLONG and caught.value.filename == str(target)
+
+
+def test_the_place_of_a_file_is_checked_beforehand(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    check_writable(tmp_path / "new" / "deep" / "t.CSV", (".csv",))
+    check_writable(tmp_path / "file")
+    for path, words in (
+        (tmp_path / "file" / "t.csv", f"{tmp_path / 'file'} is no folder"),
+        (tmp_path / "file" / "new" / "t.csv", f"{tmp_path / 'file'} is no folder"),
+        (tmp_path / "t.txt", "cannot write '.txt'; use .csv or .parquet"),
+    ):
+        with pytest.raises(InputError) as raised:
+            check_writable(path, (".csv", ".parquet"))
+        assert words in str(raised.value)
+    with pytest.raises(InputError, match="is no folder"), written_whole(tmp_path / "file" / "t"):
+        pass
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    with pytest.raises(InputError, match="cannot be written to"):
+        check_writable(tmp_path / "new" / "t.csv")
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]

@@ -52,7 +52,7 @@ def test_keypoints(tmp_path):
     )
     write_table(table.assign(feature=["dog", "dog", "laplacian"]), tmp_path / "k.csv")
     text = describe(tmp_path / "k.csv")
-    assert "table of 3 keypoints" in text and "2 maxima, 1 minima" in text
+    assert "table of 3 keypoints" in text and "2 maxima, 1 minimum\n" in text
     assert "  y: 1.5 to 9\n" in text and "  x: 3 to 4, 1 missing\n" in text
     assert text.endswith("  feature: 2 values")
 
@@ -65,3 +65,16 @@ def test_other_tables_and_groups(tmp_path):
     zarr.create_group(tmp_path / "other", zarr_format=3)
     with pytest.raises(InputError, match="none that keystab wrote"):
         describe(tmp_path / "other")
+
+
+def test_text_in_the_columns_of_keypoints_is_no_error(tmp_path):
+    names = ["y", "x", "sigma", "sign"]
+    write_table(pd.DataFrame([["a", "b", "c", "plus"]] * 2, columns=names), tmp_path / "t.csv")
+    text = describe(tmp_path / "t.csv")
+    assert "table of 2 rows\n" in text and "  sign: 1 value" in text
+    write_table(pd.DataFrame([[1.0, 2.0, 1.1, "plus"]], columns=names), tmp_path / "t.csv")
+    assert describe(tmp_path / "t.csv").splitlines()[0].endswith("table of 1 keypoint")
+    write_table(pd.DataFrame([], columns=names), tmp_path / "t.csv")
+    assert "table of 0 keypoints\n  0 maxima, 0 minima" in describe(tmp_path / "t.csv")
+    write_table(pd.DataFrame([[1.0, 2.0, 1.1, -1]], columns=names), tmp_path / "t.csv")
+    assert "  0 maxima, 1 minimum\n" in describe(tmp_path / "t.csv")

@@ -200,3 +200,20 @@ def test_errors_about_sets(keywords, word):
 def test_gather_marks_what_is_missing():
     gathered = gather([1.5, 2.5], np.array([[0, -1], [-1, 1]]))
     np.testing.assert_array_equal(gathered, [[1.5, np.nan], [np.nan, 2.5]])
+
+
+def test_what_is_no_number_or_has_no_order_gets_one_line():
+    table = pd.DataFrame({"y": 0.0, "x": [0.0, 5.0], "sigma": 1.1, "set": ["a", "b"]})
+    for change, words in (
+        ({"y": ["top", "low"]}, "column 'y' holds text"),
+        ({"set": [1, "a"]}, "column 'set' names sets by values that have no common order"),
+    ):
+        wrong = table.assign(**change)
+        for compute in (unique_keypoints, lambda bad: occurrence(table, bad)):
+            with pytest.raises(InputError) as raised:
+                compute(wrong)
+            assert words in str(raised.value) and "\n" not in str(raised.value)
+    with pytest.raises(InputError, match="space_tolerance is 'wide'"):
+        unique_keypoints(table, space_tolerance="wide")
+    with pytest.raises(InputError, match="scale_ratio is None"):
+        occurrence(table, table, scale_ratio=None)

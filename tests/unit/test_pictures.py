@@ -9,7 +9,7 @@ import tifffile
 from PIL import Image
 
 from keystab.errors import InputError
-from keystab.pictures import pixel_digest, read_picture, write_picture
+from keystab.pictures import picture_shape, pixel_digest, read_picture, write_picture
 
 LEVELS = np.array([[0, 51, 102], [153, 204, 255]], dtype=np.uint8)
 COLOUR = np.random.default_rng(0).integers(0, 256, (5, 4, 3), dtype=np.uint8)
@@ -78,6 +78,13 @@ def test_tiff_varieties(tmp_path):
     np.testing.assert_allclose(
         read_picture(tmp_path / "planes.tif"), COLOUR_GREY, rtol=0, atol=1e-15
     )
+    bits = LEVELS > 100
+    tifffile.imwrite(tmp_path / "bits.tif", bits, photometric="miniswhite")
+    np.testing.assert_array_equal(read_picture(tmp_path / "bits.tif"), ~bits)
+    with tifffile.TiffWriter(tmp_path / "preview.tif") as tiff:
+        tiff.write(LEVELS, photometric="minisblack")
+        tiff.write(LEVELS[::2, ::2], photometric="minisblack", subfiletype=1)
+    np.testing.assert_array_equal(read_picture(tmp_path / "preview.tif"), LEVELS / 255)
     Image.fromarray(COLOUR).save(tmp_path / "lzw.tif", compression="tiff_lzw")
     np.testing.assert_allclose(read_picture(tmp_path / "lzw.tif"), COLOUR_GREY, rtol=0, atol=1e-15)
 
@@ -109,6 +116,20 @@ def test_digest_is_that_of_the_pixel_bytes(tmp_path):
     assert pixel_digest(tmp_path / "big.tif") == little
 
 
+NO_FORMAT = "its content is none of PNG, JPEG, TIFF and .npy"
+
+
+def animate(path):
+    frames = [Image.fromarray(LEVELS), Image.fromarray(255 - LEVELS)]
+    frames[0].save(path, save_all=True, append_images=frames[1:])
+
+
+def write_pages(path):
+    with tifffile.TiffWriter(path) as tiff:
+        for size in (8, 6):  # no stack: the pages differ in size
+            tiff.write(np.zeros((size, size), np.uint8), photometric="minisblack")
+
+
 def refuse_16_bit_colour(path):
     """A PNG header that promises colour at 16 bits; the decoder never gets to see it."""
     path.write_bytes(
@@ -124,8 +145,8 @@ def refuse_16_bit_colour(path):
     [
         ("gone.png", lambda p: None, "no such file"),
         ("folder.png", lambda p: p.mkdir(), "cannot be opened"),
-        ("text.png", lambda p: p.write_text("hello"), "not a readable picture"),
-        ("empty.png", lambda p: p.write_bytes(b""), "not a readable picture"),
+        ("text.png", lambda p: p.write_text("hello"), NO_FORMAT),
+        ("empty.png", lambda p: p.write_bytes(b""), NO_FORMAT),
         ("cut.png", lambda p: cut(p), "not a readable picture"),
         ("cut.tif", lambda p: p.write_bytes(b"II*\0\x08\0"), "not a readable picture"),
         ("deep.png", refuse_16_bit_colour, "16 bits per channel"),
@@ -139,6 +160,19 @@ def refuse_16_bit_colour(path):
             "pages.tif",
             lambda p: tifffile.imwrite(p, np.zeros((3, 8, 8), np.uint8), photometric="minisblack"),
             "3 pictures",
+        ),
+        ("sizes.tif", write_pages, "the TIFF holds 2 pictures"),
+        (
+            "stack.tif",
+            lambda p: tifffile.imwrite(p, np.zeros((3, 8, 8), np.uint8), imagej=True),
+            "the TIFF holds 3 pictures",
+        ),
+        ("moving.gif", animate, "the GIF file holds 2 pictures"),
+        ("moving.png", animate, "the PNG file holds 2 pictures"),
+        (
+            "inverse.tif",
+            lambda p: tifffile.imwrite(p, np.float32(LEVELS), photometric="miniswhite"),
+            "0 is white (MINISWHITE)",
         ),
     ],
 )
@@ -162,3 +196,71 @@ def test_unknown_suffix_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"cannot write '\.bmp'"):
         write_picture(np.zeros((2, 2)), tmp_path / "u.bmp")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_jpeg_with_previews_is_one_picture(tmp_path):
+    flat, preview = (Image.fromarray(np.full((16, 16), v, np.uint8)) for v in (128, 0))
+    flat.save(tmp_path / "phone.jpg", "MPO", save_all=True, append_images=[preview])
+    assert picture_shape(tmp_path / "phone.jpg") == (16, 16)
+    np.testing.assert_allclose(read_picture(tmp_path / "phone.jpg"), 128 / 255, atol=1 / 255)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".npy"])
+@pytest.mark.parametrize("disguise", [".png", ".tif", ".npy", ""])
+def test_content_and_not_the_suffix_decides(tmp_path, suffix, disguise):
+    u = np.linspace(0, 1, 54).reshape(6, 9)
+    write_picture(u, tmp_path / f"u{suffix}")
+    path = (tmp_path / f"u{suffix}").rename(tmp_path / f"picture{disguise}")
+    assert picture_shape(path) == (6, 9)
+    np.testing.assert_allclose(read_picture(path), u, atol=1e-5)
+
+
+def test_shape_of_colour_and_what_has_none(tmp_path):
+    np.save(tmp_path / "colour.npy", COLOUR)
+    assert picture_shape(tmp_path / "colour.npy") == (5, 4)
+    tifffile.imwrite(
+        tmp_path / "planes.tif", np.moveaxis(COLOUR, -1, 0), photometric="rgb", planarconfig=2
+    )
+    assert picture_shape(tmp_path / "planes.tif") == (5, 4)
+    np.save(tmp_path / "line.npy", np.zeros(5))
+    write_pages(tmp_path / "pages.tif")
+    animate(tmp_path / "moving.gif")
+    (tmp_path / "text.tif").write_text("hello")
+    for name, words in (
+        ("line.npy", "shape (5,)"),
+        ("pages.tif", "2 pictures"),
+        ("moving.gif", "2 pictures"),
+        ("text.tif", NO_FORMAT),
+        ("gone.png", "no such file; give the path of a PNG, JPEG, TIFF or .npy picture"),
+    ):
+        with pytest.raises(InputError) as raised:
+            picture_shape(tmp_path / name)
+        assert words in str(raised.value)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".npy"])
+@pytest.mark.parametrize(
+    ("u", "words"),
+    [
+        ([[0.0, np.nan]], "1 of 2 pixels is NaN"),
+        ([[np.inf, -np.inf]], "2 of 2 pixels are NaN or infinite"),
+        (np.zeros((2, 2, 3)), "shape (2, 2, 3)"),
+        (np.zeros((0, 2)), "shape (0, 2)"),
+        ([[1j]], "complex128"),
+        ([["black"]], "<U5"),
+    ],
+)
+def test_what_is_no_grey_picture_is_not_written(tmp_path, suffix, u, words):
+    with pytest.raises(InputError) as raised:
+        write_picture(u, tmp_path / f"u{suffix}")
+    assert words in str(raised.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_never_replaces_a_folder(tmp_path):
+    path = tmp_path / "u.npy"
+    path.mkdir()
+    (path / "precious").write_text("kept")
+    with pytest.raises(InputError, match=r"u\.npy is a folder; give a file name"):
+        write_picture(LEVELS / 255, path)
+    assert (path / "precious").read_text() == "kept"

@@ -69,11 +69,11 @@ WRONG = [
     ({"detector": {"epsilon": "1e-6"}}, "detector.epsilon is the text '1e-6', allowed is a number of at least 0: write 1.0e-06"),
     ({"detector": {"sigma_min": "1.1"}}, "detector.sigma_min is the text '1.1', allowed is a number above 0: write 1.1"),
     ({"refinement": {"max_offset": "inf"}}, "refinement.max_offset is the text 'inf', allowed is a number above 0: write .inf"),
-    ({"refinement": {"max_iterations": 2.0}}, "refinement.max_iterations is 2.0, allowed is a whole number of at least 1 and at most 10 (default 2)"),
+    ({"refinement": {"max_iterations": 2.0}}, "refinement.max_iterations is 2.0, allowed is a whole number of at least 1 and at most 100 (default 2)"),
     ({"refinement": {"scale_moves": "False"}}, "refinement.scale_moves is the text 'False', allowed is true or false: write false without quotes"),
     ({"refinement": {"scale_moves": 1}}, "refinement.scale_moves is 1, allowed is true or false (default true)"),
     ({"detector": None}, "detector is empty, allowed is a block of settings"),
-    ({"grid": {"n_spo": 3}}, "grid.n_spo is 3, allowed is a list [a, b, ...], each a whole number of at least 1 and at most 100, smallest first, none twice (default [3, 5, 7, 9, 11, 13, 15, 17, 19])"),
+    ({"grid": {"n_spo": 3}}, "grid.n_spo is 3, allowed is a list with at least 2 items, each a whole number of at least 1 and at most 100, smallest first, none twice (default [3, 5, 7, 9, 11, 13, 15, 17, 19])"),
     ({"grid": {"n_spo": [3, "5"]}}, "grid.n_spo[1] is the text '5', allowed is a whole number of at least 1 and at most 100: write 5"),
     ({"results": 3}, "results is 3, allowed is a text that is not empty (default results)"),
     ({"draft": "yes"}, "draft is the text 'yes', allowed is true or false (default false)"),
@@ -84,6 +84,10 @@ WRONG = [
     ({"samplings": {"n_spo": [3, 3]}}, "samplings.n_spo is [3, 3], allowed is a list with at least 2 items, each a whole number of at least 1 and at most 100, smallest first, none twice"),
     ({"samplings": {"n_spo": [5, 3]}}, "samplings.n_spo is [5, 3], allowed is a list with at least 2 items"),
     ({"comparison": {"stable_above": 1.2}}, "comparison.stable_above is 1.2, allowed is a number of at least 0 and at most 1 (default 0.8)"),
+    ({"grid": {"n_spo": [3]}}, "grid.n_spo is [3], allowed is a list with at least 2 items, each a whole number"),
+    ({"grid": {"delta_min": [0.5]}}, "grid.delta_min is [0.5], allowed is a list with at least 2 items, each a number above 0"),
+    ({"refinement": {"max_iterations": 101}}, "refinement.max_iterations is 101, allowed is a whole number of at least 1 and at most 100 (default 2)"),
+    ({"comparison": {"last_scale": 1}}, "comparison.last_scale is 1, allowed is a number above 1 or null"),
     # choices
     ({"refinement": {"move": "neerest"}}, "refinement.move is the text 'neerest', allowed is nearest or unit_step: did you mean nearest?"),
     ({"views_dtype": "float16"}, "views_dtype is the text 'float16', allowed is float32 or float64: did you mean float"),
@@ -104,6 +108,13 @@ def test_all_problems_are_listed():
     given = {"detector": {"kappa": 0.5, "epsilon": -1}, "drafft": True}
     lines = settings.schema_problems(given, SCHEMA)
     assert len(lines) == 3
+
+
+def test_as_many_models_are_allowed_as_paths_have():
+    from keystab.refinement import MOST_MODELS
+
+    given = {"refinement": {"max_iterations": MOST_MODELS}}
+    assert settings.checked(given, SCHEMA)["refinement"]["max_iterations"] == MOST_MODELS
 
 
 def test_infinity_is_allowed_where_the_paper_uses_it():

@@ -9,8 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from keystab.figures import _render, fig4
 from keystab.pictures import pixel_digest, write_picture
-from keystab.stages import _run, detect, scale_space, simulate
+from keystab.stages import (
+    _run,
+    count_refined,
+    cut_cubes,
+    detect,
+    match_samplings,
+    scale_space,
+    score_features,
+    simulate,
+)
 from keystab.tables import read_table
 
 STAGES = sorted(
@@ -72,8 +82,9 @@ def test_stored_and_streamed_detections_are_the_same_to_the_bit(reference, tmp_p
     store = ["--store", str(tmp_path / "n4")]
     digest = ["--digest", str(tmp_path / "n4.sha256")]
     assert scale_space.main([*views, "--n-spo", "4", *DETECTOR, *store, *digest]) == 0
+    sealed = [*store, "--store-digest", str(tmp_path / "n4.sha256")]
     assert detect.main(detect_arguments(tmp_path, "streamed")) == 0
-    assert detect.main(detect_arguments(tmp_path, "stored", *store)) == 0
+    assert detect.main(detect_arguments(tmp_path, "stored", *sealed)) == 0
     for name in ("", "_traces"):
         streamed, stored = (tmp_path / f"{how}{name}.parquet" for how in ("streamed", "stored"))
         assert streamed.read_bytes() == stored.read_bytes()
@@ -88,7 +99,8 @@ def test_store_of_another_scale_space_is_refused(reference, tmp_path, capsys):
     digest = ["--digest", str(tmp_path / "n5.sha256")]
     scale_space.main([*views, "--n-spo", "5", *DETECTOR, *store, *digest])
     capsys.readouterr()
-    assert detect.main(detect_arguments(tmp_path, "wrong", *store)) == 2
+    sealed = [*store, "--store-digest", str(tmp_path / "n5.sha256")]
+    assert detect.main(detect_arguments(tmp_path, "wrong", *sealed)) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "n_spo = 5, wanted is 4" in said
     assert not list(tmp_path.glob("wrong*"))
@@ -112,6 +124,110 @@ def test_tampered_views_are_refused(reference, tmp_path, capsys):
     assert detect.main(detect_arguments(tmp_path, "found")) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "data.zarr/image/c/0/0/0 is damaged" in said
+
+
+def test_a_damaged_scale_space_is_refused(reference, tmp_path, capsys):
+    simulate.main(view_arguments(reference, tmp_path))
+    views = ["--views", str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]
+    store, digest = tmp_path / "n4", tmp_path / "n4.sha256"
+    written = ["--store", str(store), "--digest", str(digest)]
+    assert scale_space.main([*views, "--n-spo", "4", *DETECTOR, *written]) == 0
+    chunk = max(store.rglob("c/*/*/*"), key=lambda file: file.stat().st_size)
+    data = bytearray(chunk.read_bytes())
+    data[100] ^= 1
+    chunk.write_bytes(data)
+    capsys.readouterr()
+    sealed = ["--store", str(store), "--store-digest", str(digest)]
+    assert detect.main(detect_arguments(tmp_path, "found", *sealed)) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"{chunk.relative_to(store)} is damaged" in said
+    assert not list(tmp_path.glob("found*"))
+
+
+def test_stores_are_never_searched_without_their_seal(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        detect.main(detect_arguments(tmp_path, "found", "--store", str(tmp_path / "n4")))
+    assert "--store and --store-digest go together" in capsys.readouterr().err
+
+
+COMPARED = ["--border", "3.0", "--first-scale", "1.2599210498948732"]
+SAME = ["--space-tolerance", "1.0", "--scale-ratio", "1.4142135623730951"]
+LABELS = ["--stable-above", "0.8", "--unstable-below", "0.2"]
+
+
+def seen_at(reference: Path, folder: Path, *samplings: int) -> list[str]:
+    """Detect in a view of a scene; return the arguments that name view and tables."""
+    assert simulate.main(view_arguments(reference, folder)) == 0
+    for n_spo in samplings:
+        arguments = detect_arguments(folder, f"n{n_spo}")
+        arguments[arguments.index("--n-spo") + 1] = str(n_spo)
+        assert detect.main(arguments) == 0
+    return [
+        *("--views", str(folder / "views"), "--views-digest", str(folder / "views.sha256")),
+        *("--samplings", *(str(folder / f"n{n_spo}.parquet") for n_spo in samplings)),
+        *("--n-spo", *map(str, samplings), *DETECTOR[:4]),
+    ]
+
+
+def refined_arguments(folder: Path, given: list[str], last_scale: str) -> list[str]:
+    return [
+        *(*given, "--traces", *(name.replace(".parquet", "_traces.parquet") for name in given if name.endswith(".parquet"))),
+        *(*COMPARED, "--last-scale", last_scale, "--max-offset", "0.6", "--max-iterations", "2"),
+        *("--table", str(folder / f"refinement_{last_scale}.csv")),
+    ]  # fmt: skip
+
+
+def test_refined_keypoints_are_counted_with_and_without_an_upper_end(reference, tmp_path):
+    given = seen_at(reference, tmp_path, 3, 5)
+    for last_scale in ("None", "2.0"):
+        assert count_refined.main(refined_arguments(tmp_path, given, last_scale)) == 0
+    open_end, closed = (read_table(tmp_path / f"refinement_{end}.csv") for end in ("None", "2.0"))
+    assert open_end["n_refined_octave"].sum() < open_end["n_refined_common"].sum()
+    assert (open_end["n_refined_octave"] == closed["n_refined_common"]).all()
+    assert (closed["n_refined_octave"] == closed["n_refined_common"]).all()
+    assert closed["n_common"].sum() < open_end["n_common"].sum()
+
+
+def test_a_picture_without_detail_has_no_keypoints_and_is_named_where_some_are_needed(
+    tmp_path, capsys
+):
+    scene = tmp_path / "grey.tif"
+    write_picture(np.full((240, 320), 0.5), scene)
+    given = seen_at(scene, tmp_path, 3, 4)
+    assert len(read_table(tmp_path / "n3.parquet")) == len(read_table(tmp_path / "n4.parquet")) == 0
+    assert count_refined.main(refined_arguments(tmp_path, given, "None")) == 0
+    counted = read_table(tmp_path / "refinement_None.csv")
+    assert counted["n_refined_common"].tolist() == [0, 0]
+
+    names = ("matches.parquet", "counts.csv", "keypoints.csv", "occurrence.csv", "summary.csv")
+    tables = [text for name in names for text in (f"--{name.split('.')[0]}", str(tmp_path / f"fig4_{name}"))]  # fmt: skip
+    matched = [*given, *SAME, "--match-sign", "False", *COMPARED, "--last-scale", "None"]
+    assert match_samplings.main([*matched, *LABELS, *tables]) == 0
+    assert read_table(tmp_path / "fig4_counts.csv")["n_extrema"].tolist() == [0, 0]
+    assert len(read_table(tmp_path / "fig4_keypoints.csv")) == 0
+
+    keypoints = ["--keypoints", str(tmp_path / "fig4_keypoints.csv")]
+    views, samplings = given[:4], given[4:7]
+    scores = [text for name in ("features", "thresholds", "roc", "auc") for text in (f"--{name}", str(tmp_path / f"{name}.csv"))]  # fmt: skip
+    matches = ["--matches", str(tmp_path / "fig4_matches.parquet")]
+    panels = ["--panels", str(tmp_path / "p.csv"), "--cubes", str(tmp_path / "c.parquet")]
+    dense = ["--n-spo", "16", "--per-group", "2", *DETECTOR]
+    capsys.readouterr()
+    for stage, arguments in (
+        (score_features, [*keypoints, *matches, *samplings, *LABELS, "--n-resamples", "100", *scores]),
+        (cut_cubes, [*views, *keypoints, *dense, *SAME, *LABELS, *panels]),
+    ):  # fmt: skip
+        assert stage.main(arguments) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "fig4_keypoints.csv has no keypoints: no sampling finds an extremum" in said
+        assert "give a picture with more detail" in said
+    arguments = ["--tables", str(tmp_path), "--pdf", str(tmp_path / "fig4.pdf")]
+    assert _render.main(fig4.draw, fig4.TABLES, arguments) == 2
+    said = capsys.readouterr().err
+    assert (
+        said.count("\n") == 1 and "nothing to draw; remake the table, from another picture" in said
+    )
 
 
 def test_blur_of_the_reference_adds_to_that_of_the_camera(reference, tmp_path):

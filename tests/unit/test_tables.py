@@ -107,3 +107,12 @@ def test_what_cannot_be_read_gets_one_line(tmp_path, name, content, words):
 
 def test_text_of_a_table():
     assert to_csv(pd.DataFrame({"a": [1.0], "b": ["x"]})) == "a,b\n1.0,x\n"
+
+
+def test_a_table_never_replaces_a_folder(tmp_path):
+    path = tmp_path / "t.csv"
+    path.mkdir()
+    (path / "precious").write_text("kept")
+    with pytest.raises(InputError, match=r"t\.csv is a folder; give a file name"):
+        write_table(TABLE, path)
+    assert (path / "precious").read_text() == "kept"

@@ -57,6 +57,8 @@ def test_edits_of_code(finished, name, old, new, expected):
         ("refinement: {max_offset: 0.7}", {"count_refined"}),
         ("refinement: {move: unit_step}", {"detect", "detect_stored", "count_refined"} | MATCHING),
         ("comparison: {match_sign: true}", MATCHING),
+        ("comparison: {last_scale: 2.0}", MATCHING | {"count_refined"}),
+        ("comparison: {scale_ratio: 1.5}", MATCHING),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),

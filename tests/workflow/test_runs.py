@@ -24,13 +24,33 @@ def tiny(project, keep: str = "false", sha: str = SHA) -> tuple[str, str]:
 
 def test_detections_of_a_stored_scale_space(project):
     target = "results/tiny/keypoints/sampling_n3.parquet"
-    run = project.snakemake(*tiny(project, "[3]"), "--", target)
+    run = project.snakemake(*tiny(project, "[3]"), "--printshellcmds", "--", target)
     assert run.returncode == 0, run.stdout
+    (shell,) = (block for block in run.stdout.split("python -m ") if ".detect " in block)
+    named = "--store results/tiny/scale_space/n3 --store-digest results/tiny/scale_space/n3.sha256"
+    assert named in shell
     store = project.folder / "results/tiny/scale_space/n3"
     assert (store / "data.zarr/zarr.json").is_file()
     assert "data.zarr/zarr.json" in store.with_suffix(".sha256").read_text()
     assert "extrema among" in (project.folder / "logs/tiny/detect/n3.log").read_text()
     assert "max_rss" in (project.folder / "logs/tiny/benchmarks/detect/n3.tsv").read_text()
+
+    tables = [project.folder / target, project.folder / target.replace("sampling", "traces")]
+    stored = [table.read_bytes() for table in tables]
+    run = project.snakemake(*tiny(project), "--printshellcmds", "--", target)
+    assert "stages.detect " in run.stdout and "--store-digest" not in run.stdout
+    assert [table.read_bytes() for table in tables] == stored
+
+    chunk = max(store.rglob("c/*/*/*"), key=lambda file: file.stat().st_size)
+    data = bytearray(chunk.read_bytes())
+    data[len(data) // 2] ^= 1
+    chunk.write_bytes(data)
+    run = project.snakemake(*tiny(project, "[3]"), "--forcerun", "detect_stored", "--", target)
+    assert run.returncode != 0
+    assert "Traceback" not in run.stdout
+    log = (project.folder / "logs/tiny/detect/n3.log").read_text()
+    assert log.count("\n") == 1 and f"{chunk.relative_to(store)} is damaged" in log
+    assert log in run.stdout
 
 
 def test_figure_from_picture_and_nothing_to_do_afterwards(project):
@@ -54,7 +74,7 @@ def test_failing_job_shows_its_one_line_and_leaves_no_output(project):
     [
         ("detector: {sigma_mim: 1}", "config: detector.sigma_mim is no setting; did you mean detector.sigma_min?"),
         ("detector: {epsilon: 1e-6}", "config: detector.epsilon is the text '1e-6', allowed is a number of at least 0: write 1.0e-06"),
-        ("reference: nowhere.png", "config: reference: nowhere.png does not exist: give the path of a picture"),
+        ("reference: nowhere.png", "config: reference: nowhere.png: no such file; give the path of a PNG, JPEG, TIFF or .npy picture"),
     ],
 )  # fmt: skip
 def test_wrong_settings_end_in_one_line(project, overlay, line):

@@ -8,6 +8,7 @@ the code and the software.
 
 import hashlib
 import os
+import shlex
 import sys
 from functools import reduce
 from operator import getitem
@@ -90,6 +91,13 @@ def one_of(numbers):
 def folder_of_inputs(_wildcards, input):
     """Folder that holds all inputs of a job."""
     return os.path.dirname(input[0])
+
+
+def options_of_store(_wildcards, input):
+    """Options of detection for the stored scale-space among a job's inputs; none where it streams."""
+    if "store" not in input.keys():
+        return ""
+    return f"--store {shlex.quote(input.store)} --store-digest {shlex.quote(input.store_digest)}"
 
 
 def max_offset_of_path(_wildcards):

@@ -29,6 +29,7 @@ rule detect:
         scale_moves=setting("refinement.scale_moves"),
         move=setting("refinement.move"),
         max_offset=max_offset_of_path,
+        store=options_of_store,
         code=fingerprint("keystab.stages.detect"),
         software=SOFTWARE,
     message:
@@ -46,6 +47,7 @@ rule detect:
             --scale-moves {params.scale_moves} \
             --move {params.move} \
             --max-offset {params.max_offset} \
+            {params.store} \
             --extrema {output.extrema:q} \
             --traces {output.traces:q} \
             >{log:q} 2>&1

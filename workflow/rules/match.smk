@@ -95,6 +95,7 @@ rule match_grid:
         match_sign=setting("comparison.match_sign"),
         border=setting("comparison.border"),
         first_scale=setting("comparison.first_scale"),
+        last_scale=setting("comparison.last_scale"),
         code=fingerprint("keystab.stages.match_grid"),
         software=SOFTWARE,
     message:
@@ -116,6 +117,7 @@ rule match_grid:
             --match-sign {params.match_sign} \
             --border {params.border} \
             --first-scale {params.first_scale} \
+            --last-scale {params.last_scale} \
             --table {output.table:q} \
             >{log:q} 2>&1
         """
@@ -149,6 +151,7 @@ rule match_samplings:
         match_sign=setting("comparison.match_sign"),
         border=setting("comparison.border"),
         first_scale=setting("comparison.first_scale"),
+        last_scale=setting("comparison.last_scale"),
         stable_above=setting("comparison.stable_above"),
         unstable_below=setting("comparison.unstable_below"),
         code=fingerprint("keystab.stages.match_samplings"),
@@ -169,6 +172,7 @@ rule match_samplings:
             --match-sign {params.match_sign} \
             --border {params.border} \
             --first-scale {params.first_scale} \
+            --last-scale {params.last_scale} \
             --stable-above {params.stable_above} \
             --unstable-below {params.unstable_below} \
             --matches {output.matches:q} \
@@ -205,6 +209,7 @@ rule count_refined:
         kappa=setting("detector.kappa"),
         border=setting("comparison.border"),
         first_scale=setting("comparison.first_scale"),
+        last_scale=setting("comparison.last_scale"),
         max_offset=setting("refinement.max_offset"),
         max_iterations=setting("refinement.max_iterations"),
         code=fingerprint("keystab.stages.count_refined"),
@@ -223,6 +228,7 @@ rule count_refined:
             --kappa {params.kappa} \
             --border {params.border} \
             --first-scale {params.first_scale} \
+            --last-scale {params.last_scale} \
             --max-offset {params.max_offset} \
             --max-iterations {params.max_iterations} \
             --table {output.table:q} \
@@ -293,6 +299,8 @@ rule cut_cubes:
         sigma_min=setting("detector.sigma_min"),
         kappa=setting("detector.kappa"),
         oversampling=setting("detector.oversampling"),
+        space_tolerance=setting("comparison.space_tolerance"),
+        scale_ratio=setting("comparison.scale_ratio"),
         stable_above=setting("comparison.stable_above"),
         unstable_below=setting("comparison.unstable_below"),
         code=fingerprint("keystab.stages.cut_cubes"),
@@ -310,6 +318,8 @@ rule cut_cubes:
             --sigma-min {params.sigma_min} \
             --kappa {params.kappa} \
             --oversampling {params.oversampling} \
+            --space-tolerance {params.space_tolerance} \
+            --scale-ratio {params.scale_ratio} \
             --stable-above {params.stable_above} \
             --unstable-below {params.unstable_below} \
             --panels {output.panels:q} \

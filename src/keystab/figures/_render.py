@@ -72,7 +72,10 @@ def check_tables(tables: Tables, needs: Needs) -> None:
         if missing:
             raise InputError(f"{name}: lacks the column(s) {', '.join(missing)}; remake the table")
         if len(table) == 0:
-            raise InputError(f"{name}: has no rows, so there is nothing to draw; remake the table")
+            raise InputError(
+                f"{name}: has no rows, so there is nothing to draw; remake the table, from another "
+                "picture or a wider range of comparison where it was empty of keypoints"
+            )
 
 
 def save(figure: Figure, path: Path | str) -> None:

@@ -64,7 +64,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     Raises
     ------
     InputError
-        If the table is unusable, holds no grid or no balanced sampling.
+        If the table is unusable, holds no grid, no balanced sampling or no extremum.
     """
     check_tables(tables, TABLES)
     table = tables["fig3"]
@@ -74,6 +74,11 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         raise InputError("fig3.csv: no row is marked balanced; remake the table")
     if len(grid) == 0:
         raise InputError("fig3.csv: no two n_spo share a delta_min, so there is no grid to draw")
+    if not (grid["n_extrema"] > 0).any() or not (curve["n_extrema"] > 0).any():
+        raise InputError(
+            "fig3.csv: no sampling has an extremum, so there is nothing to draw; give a picture "
+            "with more detail"
+        )
     limits = grid[list(COUNTS)].min().min(), grid[list(COUNTS)].max().max()
     with style.context():
         from matplotlib.colors import LogNorm, Normalize

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.comparison import comparable
+from keystab.errors import InputError
 from keystab.seals import verify
 from keystab.stores import attributes_of, open_views, view
 from keystab.tables import read_table
@@ -47,6 +48,23 @@ def read_extrema(paths: Sequence[Path]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
+def read_keypoints(path: Path, columns: Sequence[str]) -> pd.DataFrame:
+    """Read the table of unique keypoints, for what cannot be done without any.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    keypoints = read_table(path, columns)
+    if keypoints.empty:
+        raise InputError(
+            f"{path} has no keypoints: no sampling finds an extremum in the compared range; give a "
+            "picture with more detail, or widen comparison.first_scale, last_scale and border"
+        )
+    return keypoints
+
+
 def comparable_only(
     detections: pd.DataFrame,
     shape: tuple[int, int],
@@ -55,7 +73,15 @@ def comparable_only(
 ) -> pd.DataFrame:
     """Select the detections that `keystab.comparison.comparable` says are compared."""
     return detections[
-        comparable(detections, shape, args.sigma_min, args.first_scale, args.border, scale_column)
+        comparable(
+            detections,
+            shape,
+            args.sigma_min,
+            args.first_scale,
+            args.border,
+            scale_column,
+            args.last_scale,
+        )
     ]
 
 
@@ -79,6 +105,8 @@ def positions_of_matches(matches: pd.DataFrame, extrema: pd.DataFrame) -> NDArra
     ndarray of int, shape (n_keypoints, n_samplings)
         -1 where a keypoint is not detected.
     """
+    if matches.empty:
+        return np.empty((0, extrema["n_spo"].nunique()), dtype=np.intp)
     n_spo = matches["n_spo"].unique()
     first = np.searchsorted(extrema["n_spo"].to_numpy(), n_spo)  # extrema ascend in n_spo
     row = matches["row"].to_numpy().reshape(-1, len(n_spo))

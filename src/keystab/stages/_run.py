@@ -83,13 +83,20 @@ def range_arguments(to: argparse.ArgumentParser) -> None:
     """Add what decides which detections are compared."""
     required(to, "border", "pixels left out at the border of the view", type=float)
     required(to, "first-scale", "lower end of the scale range, over sigma-min", type=float)
+    last = "upper end of the scale range, over sigma-min; None for none"
+    required(to, "last-scale", last, type=optional(float))
 
 
 def same_arguments(to: argparse.ArgumentParser) -> None:
     """Add what decides when two detections are the same."""
+    tolerance_arguments(to)
+    required(to, "match-sign", "whether the signs must agree", type=boolean)
+
+
+def tolerance_arguments(to: argparse.ArgumentParser) -> None:
+    """Add how far apart two detections may be."""
     required(to, "space-tolerance", "largest distance in y and in x, pixels", type=float)
     required(to, "scale-ratio", "largest ratio of scales", type=float)
-    required(to, "match-sign", "whether the signs must agree", type=boolean)
 
 
 def label_arguments(to: argparse.ArgumentParser) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,6 +32,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.tables import read_table, write_table
 
     view = read_view(args.views, args.views_digest)
+    octave = argparse.Namespace(**(vars(args) | {"last_scale": 2.0}))
     rows = []
     for n_spo, extrema_path, traces_path in zip(
         args.n_spo, args.samplings, args.traces, strict=True
@@ -48,6 +50,7 @@ def main(argv: Sequence[str] | None = None) -> None:
                 "n_refined": len(refined),
                 "n_common": len(comparable_only(extrema, view.shape, args)),
                 "n_refined_common": len(comparable_only(refined, view.shape, args, "sigma")),
+                "n_refined_octave": len(comparable_only(refined, view.shape, octave, "sigma")),
             }
         )
     write_table(pd.DataFrame(rows), args.table)

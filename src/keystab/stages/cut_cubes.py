@@ -17,23 +17,30 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "n-spo", "scales per octave of the dense scale-space", type=int)
     _run.required(parser, "per-group", "stable keypoints, and unstable ones", type=int)
     _run.detector_arguments(parser)
+    _run.tolerance_arguments(parser)
     _run.label_arguments(parser)
     _run.required(parser, "panels", "table of cubes to write", type=Path)
     _run.required(parser, "cubes", "table of samples to write", type=Path)
     args = parser.parse_args(argv)
 
     from keystab.cubes import cubes_around, dense_scale_space, drawn
-    from keystab.stages._inputs import read_view
-    from keystab.tables import read_table, write_table
+    from keystab.stages._inputs import read_keypoints, read_view
+    from keystab.tables import write_table
 
+    columns = ["keypoint", "y", "x", "sigma", "sign", "stability"]
+    keypoints = read_keypoints(args.keypoints, columns)
     view = read_view(args.views, args.views_digest)
     space = dense_scale_space(
-        view.image, view.blur, args.n_spo, args.sigma_min, args.kappa, args.oversampling
+        view.image,
+        view.blur,
+        args.n_spo,
+        args.sigma_min,
+        args.kappa,
+        args.oversampling,
+        args.scale_ratio,
     )
-    keypoints = drawn(
-        read_table(args.keypoints), space, args.stable_above, args.unstable_below, args.per_group
-    )
-    panels, cubes = cubes_around(space, keypoints)
+    chosen = drawn(keypoints, space, args.stable_above, args.unstable_below, args.per_group)
+    panels, cubes = cubes_around(space, chosen, args.space_tolerance, args.scale_ratio)
     write_table(panels, args.panels)
     write_table(cubes, args.cubes)
 

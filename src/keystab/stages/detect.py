@@ -20,14 +20,18 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "move", "nearest or unit_step")
     _run.required(parser, "max-offset", "M_offset of unit steps", type=_run.optional(float))
     parser.add_argument("--store", type=Path, help="stored scale-space to search")
+    parser.add_argument("--store-digest", type=Path, help="seal of --store")
     _run.required(parser, "extrema", "table of extrema to write", type=Path)
     _run.required(parser, "traces", "table of refinement traces to write", type=Path)
     args = parser.parse_args(argv)
+    if (args.store is None) != (args.store_digest is None):
+        parser.error("--store and --store-digest go together: give both or neither")
 
     from keystab.detection import extrema_table
     from keystab.dog_space import scale_space
     from keystab.extrema import discrete_extrema
     from keystab.refinement import trace
+    from keystab.seals import verify
     from keystab.stages._inputs import read_view
     from keystab.stored_extrema import stored_extrema
     from keystab.stores import StoredScaleSpace
@@ -45,6 +49,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     if args.store is None:
         found = discrete_extrema(space, args.epsilon, show_progress=True)
     else:
+        verify(args.store, args.store_digest)
         found = stored_extrema(StoredScaleSpace(args.store), space, args.epsilon)
     extrema = extrema_table(space, found)
     extrema.insert(0, "n_spo", args.n_spo)

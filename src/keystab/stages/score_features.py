@@ -24,12 +24,13 @@ def main(argv: Sequence[str] | None = None) -> None:
     args = parser.parse_args(argv)
 
     from keystab.predictor_tables import score_features
-    from keystab.stages._inputs import positions_of_matches, read_extrema
+    from keystab.stages._inputs import positions_of_matches, read_extrema, read_keypoints
     from keystab.tables import read_table, write_table
 
+    keypoints = read_keypoints(args.keypoints, ["keypoint", "stability"])
     extrema = read_extrema(args.samplings)
     scores = score_features(
-        read_table(args.keypoints, ["keypoint", "stability"]),
+        keypoints,
         extrema,
         positions_of_matches(read_table(args.matches), extrema),
         args.stable_above,
