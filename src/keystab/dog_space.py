@@ -171,23 +171,30 @@ class ScaleSpace:
         lower, upper = np.searchsorted(needed, lower), np.searchsorted(needed, upper)
         across = self.axes[1].block(*columns)
         # Products along x with every source row that some block needs, shared by all blocks.
-        factors = [block.factors[blur] for block in along for blur in needed]
-        first = min(j for j, _ in factors)
-        last = max(j + matrix.shape[1] for j, matrix in factors)
-        strips = []
-        for blur in needed:
-            j, matrix = across.factors[blur]
-            strips.append(self.source[first:last, j : j + matrix.shape[1]] @ matrix.T)
-        tallest = max(block.factors[0][1].shape[0] for block in along)
-        blurred = np.empty((needed.size, tallest, strips[0].shape[1]))
-        dog = np.empty((lower.size, tallest, strips[0].shape[1]))
+        first = min(block.first[needed].min() for block in along)
+        last = max(
+            (block.first + np.diff(block.offset) // block.rank)[needed].max() for block in along
+        )
+        strips = np.empty((needed.size, last - first, across.rank))
+        for blur, strip in zip(needed, strips, strict=True):
+            matrix = across.factor(blur)
+            left = across.first[blur]
+            np.dot(self.source[first:last, left : left + matrix.shape[1]], matrix.T, out=strip)
+        tallest = max(block.rank for block in along)
+        blurred = np.empty((needed.size, tallest, across.rank))
+        dog = np.empty((lower.size, tallest, across.rank))
         for block in along:
-            height = block.factors[0][1].shape[0]
-            for blur, strip, out in zip(needed, strips, blurred, strict=True):
-                j, matrix = block.factors[blur]
-                np.dot(matrix, strip[j - first : j - first + matrix.shape[1]], out=out[:height])
-            subtract(blurred, lower, upper, height, dog)
-            yield _expanded(dog[:, :height], block.expand, across.expand)
+            multiply(
+                needed,
+                block.rank,
+                block.first - first,
+                block.offset,
+                block.entries,
+                strips,
+                blurred,
+            )
+            subtract(blurred, lower, upper, block.rank, dog)
+            yield _expanded(dog[:, : block.rank], block.expand, across.expand)
 
     def scale_slice(self, index: int) -> np.ndarray:
         """One slice, shape (rows, columns)."""
@@ -367,6 +374,20 @@ def ranges(start: int, stop: int, length: int) -> Iterator[tuple[int, int]]:
     """Cut start .. stop into parts of `length`, the last one shorter."""
     for first in range(start, stop, length):
         yield first, min(first + length, stop)
+
+
+@njit(cache=True, nogil=True)
+def multiply(needed, rank, first, offset, entries, strips, blurred):
+    """Products along y of one block, for every needed blur.
+
+    Compiled, so that threads need not take turns between one small product and the next.
+    """
+    for k in range(needed.size):
+        blur = needed[k]
+        here = entries[offset[blur] : offset[blur + 1]]
+        width = here.size // rank
+        source = strips[k, first[blur] : first[blur] + width]
+        np.dot(here.reshape(rank, width), source, out=blurred[k, :rank])
 
 
 @njit(cache=True, nogil=True)

@@ -30,7 +30,7 @@ BLOCK_ROWS = 32
 BLOCK_COLUMNS = 256
 
 # Rows whose operators are held at once: bounds the memory on large images.
-BAND_ROWS = 4096
+BAND_ROWS = 8192
 
 
 def discrete_extrema(

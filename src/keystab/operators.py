@@ -56,19 +56,42 @@ class AxisOperator(Protocol):
 
 
 class Block(NamedTuple):
-    """Rows of L for a range of fine samples, ``L(blur) = expand @ factors[blur]``.
+    """Rows of L for a range of fine samples, ``L(blur) = expand @ factor(blur)``.
+
+    The factors of all blurs lie one behind the other in memory, so that compiled code can go
+    through them.
 
     Attributes
     ----------
     expand : ndarray, shape (n_rows, rank), or None
         What all blurs have in common; None stands for the identity.
-    factors : list of (int, ndarray)
-        For every blur the first column of the source that counts and the matrix of those
-        columns, shape (rank, n_columns).
+    rank : int
+        Rows of every factor.
+    first : ndarray of int, shape (n_blurs,)
+        The first column of the source that counts for each blur.
+    offset : ndarray of int, shape (n_blurs + 1,)
+        Where the entries of each factor begin.
+    entries : ndarray
+        Entries of all factors, row by row.
     """
 
     expand: np.ndarray | None
-    factors: list[tuple[int, np.ndarray]]
+    rank: int
+    first: np.ndarray
+    offset: np.ndarray
+    entries: np.ndarray
+
+    @classmethod
+    def of(cls, expand: np.ndarray | None, first: list[int], factors: list[np.ndarray]) -> Block:
+        """Put factors of one height behind each other."""
+        sizes = [factor.size for factor in factors]
+        offset = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+        entries = np.concatenate([factor.ravel() for factor in factors])
+        return cls(expand, len(factors[0]), np.array(first, dtype=np.int64), offset, entries)
+
+    def factor(self, blur: int) -> np.ndarray:
+        """Factor of one blur, shape (rank, n_columns)."""
+        return self.entries[self.offset[blur] : self.offset[blur + 1]].reshape(self.rank, -1)
 
 
 class SplineAxis:
@@ -107,12 +130,13 @@ class SplineAxis:
 
     def block(self, start: int, stop: int) -> Block:
         """See `AxisOperator.block`."""
-        factors = []
+        firsts, factors = [], []
         room = np.empty((stop - start, self.n_columns))
         for blur in range(self.rows.reach.size):
             first, width = fill_rows(self.rows, blur, start * self.stride, self.stride, room)
-            factors.append((first, room[:, :width].copy()))
-        return Block(None, factors)
+            firsts.append(first)
+            factors.append(room[:, :width].copy())
+        return Block.of(None, firsts, factors)
 
 
 class CosineAxis:
@@ -143,10 +167,10 @@ class CosineAxis:
         rows = self.basis(np.arange(start, stop))
         common = rows if expand is None else expand.T @ rows
         factors = [
-            (0, common[:, :count] * gain[:count])
+            common[:, :count] * gain[:count]
             for count, gain in zip(self.n_frequencies, self.gains, strict=True)
         ]
-        return Block(expand, factors)
+        return Block.of(expand, [0] * len(factors), factors)
 
     def basis(self, rows: np.ndarray, count: int | None = None) -> np.ndarray:
         """Cosines of the lowest frequencies at fine samples, shape rows.shape + (count,)."""

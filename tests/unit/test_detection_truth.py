@@ -87,7 +87,9 @@ def test_blurs_form_a_semigroup(first, second, delta):
     m = int(n / delta)
     grid = SplineAxis(m, n, delta, 1, np.array([first, math.hypot(first, second)]))
     matrices = []
-    for j, rows in grid.block(0, m).factors:
+    block = grid.block(0, m)
+    for k, j in enumerate(block.first):
+        rows = block.factor(k)
         full = np.zeros((m, n + 4))
         full[:, j : j + rows.shape[1]] = rows
         matrices.append(full)
@@ -216,13 +218,15 @@ def test_rows_do_not_grow_with_the_image(n_spo):
     for n in (700, 1400):
         blurs = scale_space(np.zeros((4, n)), 1.1, n_spo).blurs[0]
         axis = SplineAxis(int(n / delta), n, delta, 1, blurs)
-        widths.append([matrix.shape[1] for _, matrix in axis.block(600, 640).factors])
+        widths.append(np.diff(axis.block(600, 640).offset) // 40)
         rows.append(axis)
     assert np.abs(np.subtract(*widths)).max() <= 4 and max(widths[1]) < 120
     whole = SplineAxis(int(350 / delta), 350, delta, 1, blurs)
     for blur in range(blurs.size):
-        first, cut = rows[0].block(300, 340).factors[blur]
-        other, full = whole.block(300, 340).factors[blur]
+        (first, cut), (other, full) = (
+            (block.first[blur], block.factor(blur))
+            for block in (rows[0].block(300, 340), whole.block(300, 340))
+        )
         kept = full[:, first - other : first - other + cut.shape[1]] if first >= other else full
         at = max(other - first, 0)
         assert np.abs(cut[:, at : at + kept.shape[1]] - kept).max() < 1e-12
