@@ -224,9 +224,6 @@ def _scan(dog, epsilon, extrema):
                 any_here |= maximum | minimum
             if any_here:
                 for x in range(1, n_columns - 1):
-                    left, right = here[x] - here[x - 1], here[x] - here[x + 1]
-                    if max(min(left, right), -max(left, right)) <= epsilon:
-                        continue
                     sign = _sign(dog, s, y, x, epsilon)
                     if sign != 0:
                         if count < extrema.shape[0]:
@@ -242,15 +239,12 @@ def _scan(dog, epsilon, extrema):
 def _sign(dog, s, y, x, epsilon):
     """+1 for a maximum among 26 neighbours, -1 for a minimum, else 0."""
     value = dog[s, y, x]
-    maximum = minimum = True
+    sign = 1 if value - dog[s, y, x - 1] > 0 else -1
     for ds in range(-1, 2):
         for dy in range(-1, 2):
             for dx in range(-1, 2):
                 if ds == 0 and dy == 0 and dx == 0:
                     continue
-                difference = value - dog[s + ds, y + dy, x + dx]
-                maximum &= difference > epsilon
-                minimum &= -difference > epsilon
-        if not (maximum or minimum):
-            return 0
-    return 1 if maximum else -1
+                if not sign * (value - dog[s + ds, y + dy, x + dx]) > epsilon:
+                    return 0
+    return sign
