@@ -18,6 +18,7 @@ include: "workflow/rules/simulate.smk"  # the reference picture -> sets of views
 include: "workflow/rules/scale_space.smk"  # a view -> a stored scale-space, where one is kept
 include: "workflow/rules/detect.smk"  # a view or its scale-space -> extrema, with refinement traces
 include: "workflow/rules/match.smk"  # extrema of many samplings -> tables
+include: "workflow/rules/compare.smk"  # extrema of many views -> tables
 include: "workflow/rules/figures.smk"  # tables -> figures
 
 

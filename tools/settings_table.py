@@ -25,8 +25,7 @@ def rows(schema: dict[str, Any], place: str = "") -> Iterator[str]:
     """One row of the table per setting, blocks in bold."""
     for key, part in schema.get("properties", {}).items():
         name = f"{place}{key}"
-        members = part.get("properties") or part.get("additionalProperties")
-        if members:
+        if part.get("type") == "object":
             yield f"| **{name}** | {part['description']} | | |"
             inside = part if part.get("properties") else part["additionalProperties"]
             yield from rows(inside, f"{name}." if part.get("properties") else f"{name}.NAME.")

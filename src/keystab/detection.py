@@ -144,7 +144,7 @@ def detect_keypoints(
             scale = table["sigma"]
         table["s"] += slices[0]
         octaves.append(table.assign(octave=octave, scale=scale, step=space.sampling.step))
-    keep = _without_seams(octaves, n_spo, sigma_min)
+    keep = without_seams(octaves, n_spo, sigma_min)
     names = ["y", "x", "sigma", "value", "sign", "octave", "s", "row", "column", "difference"]
     names += ["models"] if refine else []
     kept = [table.loc[mask, names] for table, mask in zip(octaves, keep, strict=True)]
@@ -238,8 +238,22 @@ def refined_table(
     return table
 
 
-def _without_seams(octaves: list[pd.DataFrame], n_spo: int, sigma_min: float) -> list[np.ndarray]:
-    """Decide which detections each octave reports, see the notes of `detect_keypoints`."""
+def without_seams(octaves: list[pd.DataFrame], n_spo: int, sigma_min: float) -> list[np.ndarray]:
+    """Decide which detections each octave reports, see the notes of `detect_keypoints`.
+
+    Parameters
+    ----------
+    octaves : list of DataFrame
+        Columns ``y, x, sign, s`` (0 for the first slice of the octave), ``scale`` in pixels and
+        ``step``, the sampling step of the octave.
+    n_spo, sigma_min
+        See `detect_keypoints`.
+
+    Returns
+    -------
+    list of ndarray of bool
+        For each octave, which of its rows it reports.
+    """
     keep = []
     for octave, table in enumerate(octaves):
         s = table["s"].to_numpy()

@@ -17,13 +17,31 @@ from keystab.memory import in_words
 from keystab.pictures import picture_shape
 from keystab.sampling import Sampling, balanced_delta
 from keystab.settings import refuse
-from keystab.view_sets import per_view, view_shape
+from keystab.view_sets import (
+    assumed_blur,
+    common_field_is_empty,
+    common_scales,
+    expanded,
+    per_view,
+    view_shapes,
+    view_specs,
+)
 from keystab.views import effective_blur
 
 Settings = Mapping[str, Any]
 
 NEEDED_SETS = ("still", "examples")
 """Sets of views that the figures are made from."""
+
+SEARCHED_SETS = ("translations", "zooms", "rotations", "shipped", "blur_errors")
+"""Sets of views that are searched for keypoints."""
+
+SWEPT_SETS = {
+    "aliasing": ("figure 10", "blur"),
+    "unknown_blur": ("figure 11", "blur_spread"),
+    "noise": ("figure 12", "noise"),
+}
+"""Sweeps of sets of views that are searched: what is made of them, and what they differ in."""
 
 
 def require(settings: Settings, folder: Path | str = ".") -> None:
@@ -41,14 +59,30 @@ def require(settings: Settings, folder: Path | str = ".") -> None:
     InputError
         With one line per problem.
     """
+    refuse(sweep_problems(settings))
+    settings = {**settings, "sets": expanded(settings["sets"])}
     refuse(setting_problems(settings) or picture_problems(settings, Path(folder)))
 
 
+def sweep_problems(settings: Settings) -> list[str]:
+    """One line for every sweep that figures are made from and that does not fit them."""
+    problems = []
+    for name, (figure, key) in SWEPT_SETS.items():
+        views = settings["sets"].get(name, {})
+        if list(views.get("sweep") or {}) != [key]:
+            problems.append(f"sets.{name} has no sweep of {key}; {figure} is made from it")
+        elif len(views["n_spo"]) != 1:
+            problems.append(
+                f"sets.{name}.n_spo is {views['n_spo']}, allowed is one sampling for {figure}"
+            )
+    return problems
+
+
 def setting_problems(settings: Settings) -> list[str]:
-    """One line for every pair of settings that contradict each other."""
+    """One line for every pair of settings that contradict each other; sweeps are expanded."""
     problems = [
         f"sets.{name} is missing; the figures are made from it"
-        for name in NEEDED_SETS
+        for name in (*NEEDED_SETS, *SEARCHED_SETS)
         if name not in settings["sets"]
     ]
     for name, views in settings["sets"].items():
@@ -61,7 +95,7 @@ def setting_problems(settings: Settings) -> list[str]:
     if len(per_view(settings["sets"]["still"])["blur"]) != 1:
         problems.append("sets.still has several views; figures 3 to 6 study a single one")
     else:
-        problems += _scale_below_blur(settings)
+        problems += _scale_below_blur(settings) or searched_problems(settings)
     problems += _order(settings["comparison"], "comparison", "unstable_below", "stable_above")
     if settings["comparison"]["last_scale"] is not None:
         problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")
@@ -117,8 +151,16 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
     ]
     if problems:
         return problems
+    problems = [
+        line
+        for name, views in settings["sets"].items()
+        if views["n_spo"]
+        for line in common_problems(name, views, shape, settings)
+    ]
+    if problems:
+        return problems
     try:
-        planned = samplings(settings, view_shape(settings["sets"]["still"], shape))
+        planned = samplings(settings, view_shapes(settings["sets"]["still"], shape)[0])
     except InputError as error:
         return [str(error)]
     results = folder / settings["results"]
@@ -127,6 +169,11 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
         for sampling in planned["samplings"]
         if sampling.n_spo in kept_n_spo(settings)
         and not (results / "scale_space" / f"n{sampling.n_spo}.sha256").exists()
+    )
+    kept += sum(
+        bytes_of_stores(name, views, shape, settings)
+        for name, views in settings["sets"].items()
+        if settings["keep_scale_spaces"] is True and not (results / "scale_space" / name).exists()
     )
     free = _free_bytes(results)
     if kept > free:
@@ -137,10 +184,106 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
     return []
 
 
+def searched_problems(settings: Settings) -> list[str]:
+    """One line for every set of views that cannot be searched and compared as the figures need."""
+    problems = []
+    curves = settings["stability"]["curve_n_spo"]
+    sigma_min = settings["detector"]["sigma_min"]
+    for name, views in settings["sets"].items():
+        if name in SEARCHED_SETS and not views["n_spo"]:
+            problems.append(f"sets.{name}.n_spo is empty; give the scales per octave of a sampling")
+        elif name in ("translations", "zooms", "rotations") and set(curves) - set(views["n_spo"]):
+            problems.append(
+                f"stability.curve_n_spo is {curves}, allowed are members of sets.{name}.n_spo = "
+                f"{views['n_spo']}"
+            )
+        if not views["n_spo"]:
+            continue
+        first = sigma_min if views["sigma_min"] is None else views["sigma_min"]
+        assumed = assumed_blur(views)
+        own = per_view(views)
+        blurs = (
+            [
+                effective_blur(blur, step, settings["reference_blur"])
+                for blur, step in zip(own["blur"], own["step"], strict=True)
+            ]
+            if assumed is None
+            else [assumed]
+        )
+        if first < max(blurs):
+            problems.append(
+                f"sets.{name} is searched from sigma_min = {first:g} px, allowed is at least "
+                f"{max(blurs):g}, the blur that its views already have"
+            )
+    return problems
+
+
+def common_problems(
+    name: str, views: Settings, reference_shape: tuple[int, int], settings: Settings
+) -> list[str]:
+    """One line where the views of a set have no field of view or no scales in common.
+
+    Parameters
+    ----------
+    name : str
+        Name of the set.
+    views : dict
+        Its description, a set that is searched.
+    reference_shape : tuple of int
+        Height and width of the reference in pixels.
+    settings : dict
+        Complete settings.
+    """
+    comparison = settings["comparison"]
+    own = views["sigma_min"]
+    sigma_min = settings["detector"]["sigma_min"] if own is None else own
+    specs = view_specs(name, views, reference_shape)
+    moves = len({(spec.step, spec.shift, spec.rotation) for spec in specs}) > 1
+    needed = math.ceil(6 * sigma_min * 2 ** views["n_oct"])
+    if moves and views["guard"] < needed:
+        return [
+            f"sets.{name}.guard is {views['guard']}, allowed is at least {needed}: 6 times the "
+            f"largest scale of its {views['n_oct']} octave(s), or borders enter the comparison"
+        ]
+    low, high = common_scales(
+        specs, sigma_min, views["n_oct"], comparison["first_scale"], comparison["last_scale"]
+    )
+    if low >= high:
+        return [
+            f"sets.{name} leaves no common range of scales: the last view begins at {low:.3g} px "
+            f"of the first, which ends at {high:.3g} px; give a smaller zoom or more octaves"
+        ]
+    margin = max(views["guard"], comparison["border"])
+    if common_field_is_empty(specs, reference_shape, margin):
+        return [
+            f"sets.{name} leaves no common field of view: no pixel of the first view of "
+            f"{specs[0].shape[0]} x {specs[0].shape[1]} px lies {margin:g} px inside all "
+            f"{len(specs)} views; give smaller shifts, zooms or rotations"
+        ]
+    return []
+
+
+def bytes_of_stores(
+    name: str, views: Settings, reference_shape: tuple[int, int], settings: Settings
+) -> int:
+    """Size of the scale-spaces of all views of a set, all samplings, within a few per cent."""
+    own, kappa = views["sigma_min"], settings["detector"]["kappa"]
+    sigma_min = settings["detector"]["sigma_min"] if own is None else own
+    pixels = sum(height * width for height, width in view_shapes(views, reference_shape))
+    octaves = sum(0.25**octave for octave in range(views["n_oct"]))
+    samples = 0.0
+    for n_spo in views["n_spo"]:
+        step = views["delta_min"] or balanced_delta(n_spo, kappa, sigma_min)
+        samples += pixels * octaves * (n_spo + 2) / step**2
+    return int(8 * samples)
+
+
 def fit_problems(
     name: str, views: Settings, reference_shape: tuple[int, int], border: float
 ) -> list[str]:
     """One line where the views of a set reach beyond the reference or are all border.
+
+    Only the guard band of a view may lie beyond the reference.
 
     Examples
     --------
@@ -149,21 +292,24 @@ def fit_problems(
     >>> fit_problems("still", still, (2250, 4000), border=3)
     ['sets.still.height is 300, allowed is at most 225: the reference has 2250 px, the step is 10']
     """
-    step = max(per_view(views)["step"])
+    guard = views.get("guard", 0)
     least = math.ceil(2 * border) + 3
-    shape = view_shape(views, reference_shape)
     problems = []
-    for side, size, pixels in zip(("height", "width"), reference_shape, shape, strict=True):
-        if pixels * step > size:
-            problems.append(
-                f"sets.{name}.{side} is {pixels}, allowed is at most {int(size / step)}: the "
-                f"reference has {size} px, the step is {step:g}"
-            )
-        elif pixels < least:
-            problems.append(
-                f"sets.{name} asks for views of {shape[0]} x {shape[1]} px, allowed is a {side} of "
-                f"at least {least} px: give a larger reference or a step below {step:g}"
-            )
+    shapes = view_shapes(views, reference_shape)
+    for step, shape in zip(per_view(views)["step"], shapes, strict=True):
+        for side, size, pixels in zip(("height", "width"), reference_shape, shape, strict=True):
+            most = int(size / step) + 2 * guard
+            if pixels > most:
+                problems.append(
+                    f"sets.{name}.{side} is {pixels}, allowed is at most {most}: the reference "
+                    f"has {size} px, the step is {step:g}"
+                )
+            elif pixels - 2 * guard < least:
+                problems.append(
+                    f"sets.{name} asks for views of {shape[0]} x {shape[1]} px, allowed is a "
+                    f"{side} of at least {least + 2 * guard} px: give a larger reference or a "
+                    f"step below {step:g}"
+                )
     return problems[:1]
 
 

@@ -10,7 +10,7 @@ import yaml
 
 from keystab import feasibility, settings
 from keystab.errors import InputError
-from keystab.view_sets import per_view, view_shape, view_specs
+from keystab.view_sets import per_view, view_shapes, view_specs
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
@@ -51,7 +51,19 @@ def test_shipped_settings_are_feasible(path):
         ([("sets.still.step", 500)], "sets.still asks for views of 4 x 8 px, allowed is a height of at least 9 px"),
         ([("sets.examples.height", 113)], "sets.examples.height is 113, allowed is at most 112: the reference has 2250 px, the step is 20"),
         ([("sets.still.step", 0.01), ("keep_scale_spaces", False)], "delta_min = "),
-        ([("sets.still.step", 1), ("keep_scale_spaces", True)], "keep_scale_spaces asks for 1.53 TB of stores"),
+        ([("keep_scale_spaces", True)], "keep_scale_spaces asks for 3.1 TB of stores, 1 TB are free"),
+        ([("sets.aliasing.sweep", None)], "sets.aliasing has no sweep of blur; figure 10 is made from it"),
+        ([("sets.noise.sweep", {"blur": [1.0]})], "sets.noise has no sweep of noise; figure 12 is made from it"),
+        ([("sets.unknown_blur.n_spo", [3, 15])], "sets.unknown_blur.n_spo is [3, 15], allowed is one sampling for figure 11"),
+        ([("sets.unknown_blur.sweep", {"blur_spread": [0.8]})], "sets.unknown_blur_0p8 has blur_spread 0.8, allowed is at most blur = 0.7"),
+        ([("sets.zooms.n_spo", [])], "sets.zooms.n_spo is empty; give the scales per octave of a sampling"),
+        ([("stability.curve_n_spo", [3, 14])], "stability.curve_n_spo is [3, 14], allowed are members of sets.rotations.n_spo = "),
+        ([("sets.shipped.blur", 0.9)], "sets.shipped is searched from sigma_min = 0.8 px, allowed is at least 0.9, the blur that its views already have"),
+        ([("sets.blur_errors.assumed_blur", 1.2)], "sets.blur_errors is searched from sigma_min = 1.1 px, allowed is at least 1.2"),
+        ([("sets.zooms.guard", 26)], "sets.zooms.guard is 26, allowed is at least 27: 6 times the largest scale of its 2 octave(s)"),
+        ([("sets.zooms.zoom", 4.0), ("sets.zooms.n_oct", 2)], "sets.zooms leaves no common range of scales: the last view begins at 5.54 px of the first, which ends at 4.4 px"),
+        ([("sets.translations.shift_spread", 300.0)], "sets.translations leaves no common field of view: no pixel of the first view of 259 x 434 px lies 17 px inside all 32 views"),
+        ([("sets.translations.height", 260)], "sets.translations.height is 260, allowed is at most 259: the reference has 2250 px, the step is 10"),
     ],
 )  # fmt: skip
 def test_contradictions_get_one_line(changes, line, monkeypatch):
@@ -75,7 +87,7 @@ def test_views_of_a_set():
     rest = {"shift_y": 0.0, "shift_x": [0.0, 0.25], "rotation": 0.0, "noise": 0.0}
     views = {"blur": 1.1, "step": [10.0, 12.0], "height": None, "width": 30, **rest}
     assert per_view(views)["blur"] == [1.1, 1.1]
-    assert view_shape(views, (250, 400)) == (20, 30)  # the largest step decides
+    assert view_shapes(views, (250, 400)) == [(20, 30)] * 2  # the largest step decides
     first, second = view_specs("some", views, (250, 400))
     assert (first.step, first.shift, first.shape) == (10.0, (0.0, 0.0), (20, 30))
     assert (second.step, second.shift, second.seed) == (12.0, (0.0, 0.25), ("some", 1))

@@ -19,13 +19,14 @@ SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text
 
 def leaves(schema: dict, name: str = ""):
     """Every setting of a schema with its place."""
+    if schema.get("type") != "object":
+        yield name, schema
+        return
     for key, part in schema.get("properties", {}).items():
         yield from leaves(part, f"{name}.{key}" if name else key)
     others = schema.get("additionalProperties")
     if isinstance(others, dict):
         yield from leaves(others, f"{name}.NAME")
-    if "properties" not in schema:
-        yield name, schema
 
 
 def test_schema_is_a_schema():

@@ -51,6 +51,8 @@ def view_arguments(reference: Path, folder: Path, **changes: str) -> list[str]:
         "noise": "0.0",
         "height": "None",
         "width": "None",
+        "whole": "False",
+        "guard": "0",
         "dtype": "float32",
         "store": str(folder / "views"),
         "digest": str(folder / "views.sha256"),

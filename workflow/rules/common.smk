@@ -16,7 +16,7 @@ from pathlib import Path
 
 import yaml
 
-from keystab import feasibility, settings
+from keystab import feasibility, settings, view_sets
 from keystab.errors import InputError
 from keystab.fingerprint import fingerprint
 
@@ -30,6 +30,13 @@ try:
         )
     )
     feasibility.require(config)
+    # Sweep -> its sets and their values. From here on every set is one of its own.
+    SWEEPS = {
+        name: view_sets.members(config["sets"], name)
+        for name, views in config["sets"].items()
+        if views["sweep"]
+    }
+    config["sets"] = view_sets.expanded(config["sets"])
 except InputError as problems:
     sys.exit(str(problems))
 
@@ -41,6 +48,11 @@ LOGS = config["logs"]
 # Samplings whose scale-space is written to a store; all others are streamed.
 KEPT = feasibility.kept_n_spo(config)
 STREAMED = sorted(set(config["samplings"]["n_spo"]) - set(KEPT))
+
+# The same for sets of views: all or none.
+SEARCHED_SETS = [name for name, views in config["sets"].items() if views["n_spo"]]
+KEPT_SETS = SEARCHED_SETS if config["keep_scale_spaces"] is True else []
+STREAMED_SETS = [name for name in SEARCHED_SETS if name not in KEPT_SETS]
 
 # Snakemake does not see a change of installed packages; a parameter that changes with the lock
 # file tells it.
@@ -72,10 +84,20 @@ def setting(place):
     """Parameter with the value of a setting; wildcards in its place are filled in."""
 
     def value_of(wildcards):
-        name = place.format(**dict(wildcards.items()))
-        return Named(name, reduce(getitem, name.split("."), config))
+        keys = [key.format(**dict(wildcards.items())) for key in place.split(".")]
+        return Named(".".join(keys), reduce(getitem, keys, config))
 
     return value_of
+
+
+def of_every_view(key):
+    """Parameter with the values of one property of all views of a set."""
+
+    def values_of(wildcards):
+        values = view_sets.per_view(config["sets"][wildcards.set])[key]
+        return Named(f"{wildcards.set}.{key}", values)
+
+    return values_of
 
 
 wildcard_constraints:
@@ -105,3 +127,31 @@ def max_offset_of_path(_wildcards):
     refinement = config["refinement"]
     depends = refinement["move"] == "unit_step"
     return Named("refinement.max_offset", refinement["max_offset"] if depends else None)
+
+
+def sigma_min_of_set(wildcards):
+    """First scale of the scale-spaces of a set."""
+    own = config["sets"][wildcards.set]["sigma_min"]
+    sigma_min = config["detector"]["sigma_min"] if own is None else own
+    return Named(f"{wildcards.set}.sigma_min", sigma_min)
+
+
+def assumed_blur_of_set(wildcards):
+    """Blur that the detector assumes for a set; None for that of each view."""
+    return Named(
+        f"{wildcards.set}.assumed_blur", view_sets.assumed_blur(config["sets"][wildcards.set])
+    )
+
+
+def detections_of(set_name, what):
+    """Tables of a set, one per sampling at which it is searched."""
+    return expand(
+        f"{RESULTS}/keypoints/{set_name}/{what}_n{{n_spo}}.parquet",
+        n_spo=config["sets"][set_name]["n_spo"],
+    )
+
+
+def kappas(_wildcards):
+    """Ratios of the difference of Gaussians that figure 9 compares, smallest first."""
+    fractions = sorted(config["kappas"]["fractions"], reverse=True)
+    return Named("kappas.fractions", [2 ** (1 / fraction) for fraction in fractions])

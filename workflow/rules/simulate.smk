@@ -20,19 +20,21 @@ rule simulate:
     params:
         reference_sha256=setting("reference_sha256"),
         reference_blur=setting("reference_blur"),
-        blur=setting("sets.{set}.blur"),
-        step=setting("sets.{set}.step"),
-        shift_y=setting("sets.{set}.shift_y"),
-        shift_x=setting("sets.{set}.shift_x"),
-        rotation=setting("sets.{set}.rotation"),
-        noise=setting("sets.{set}.noise"),
+        blur=of_every_view("blur"),
+        step=of_every_view("step"),
+        shift_y=of_every_view("shift_y"),
+        shift_x=of_every_view("shift_x"),
+        rotation=of_every_view("rotation"),
+        noise=of_every_view("noise"),
         height=setting("sets.{set}.height"),
         width=setting("sets.{set}.width"),
+        whole=setting("sets.{set}.whole"),
+        guard=setting("sets.{set}.guard"),
         dtype=setting("views_dtype"),
         code=fingerprint("keystab.stages.simulate"),
         software=SOFTWARE,
     message:
-        "Simulating the views '{wildcards.set}': blur {params.blur}, step {params.step}"
+        "Simulating the views '{wildcards.set}'"
     shell:
         """
         python -m keystab.stages.simulate \
@@ -48,6 +50,8 @@ rule simulate:
             --noise {params.noise} \
             --height {params.height} \
             --width {params.width} \
+            --whole {params.whole} \
+            --guard {params.guard} \
             --dtype {params.dtype} \
             --store {output.store:q} \
             --digest {output.digest:q} \

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +16,9 @@ from keystab.errors import InputError
 from keystab.seals import verify
 from keystab.stores import attributes_of, open_views, view
 from keystab.tables import read_table
-from keystab.views import effective_blur
+from keystab.view_sets import common_scales
+from keystab.view_tables import CommonRange
+from keystab.views import ViewSpec, effective_blur
 
 
 class View(NamedTuple):
@@ -32,13 +34,74 @@ class View(NamedTuple):
         return height, width
 
 
-def read_view(store: Path, digest: Path, number: int = 0) -> View:
-    """Read one view of a stored set, after checking the store against its seal."""
+def read_view(store: Path, digest: Path) -> View:
+    """Read the first view of a stored set, after checking the store against its seal."""
+    return read_views(store, digest)[0]
+
+
+class Views:
+    """The views of a stored set, each read when it is asked for.
+
+    Parameters
+    ----------
+    store : path
+        Store of the views, already checked.
+    """
+
+    def __init__(self, store: Path) -> None:
+        self._views = open_views(store)
+        self._attributes = attributes_of(store)
+
+    def __len__(self) -> int:
+        return int(self._views.sizes["view"])
+
+    def __iter__(self) -> Iterator[View]:
+        return (self[number] for number in range(len(self)))
+
+    def __getitem__(self, number: int) -> View:
+        blur, step = (float(self._views[name][number]) for name in ("blur", "step"))
+        own = effective_blur(blur, step, self._attributes["reference_blur"])
+        return View(view(self._views, number), own)
+
+    @property
+    def reference_shape(self) -> tuple[int, int]:
+        """Height and width of the reference in pixels."""
+        height, width = self._attributes["reference_shape"]
+        return height, width
+
+    @property
+    def specs(self) -> list[ViewSpec]:
+        """How each view was taken."""
+        numbers = {
+            name: self._views[name].to_numpy().tolist()
+            for name in ("blur", "step", "height", "width", "shift_y", "shift_x", "rotation")
+        }
+        noise = self._views["noise"].to_numpy().tolist()
+        return [
+            ViewSpec(
+                numbers["blur"][k],
+                numbers["step"][k],
+                (numbers["height"][k], numbers["width"][k]),
+                (numbers["shift_y"][k], numbers["shift_x"][k]),
+                numbers["rotation"][k],
+                noise[k],
+                (str(self._attributes["set"]), k),
+            )
+            for k in range(len(self))
+        ]
+
+
+def read_views(store: Path, digest: Path) -> Views:
+    """Open all views of a stored set, after checking the store against its seal."""
     verify(store, digest)
-    views = open_views(store)
-    blur, step = (float(views[name][number]) for name in ("blur", "step"))
-    reference_blur = attributes_of(store)["reference_blur"]
-    return View(view(views, number), effective_blur(blur, step, reference_blur))
+    return Views(store)
+
+
+def common_range(views: Views, args: argparse.Namespace) -> CommonRange:
+    """Field of view and range of scales that all views of a set have in common."""
+    specs = views.specs
+    scales = common_scales(specs, args.sigma_min, args.n_oct, args.first_scale, args.last_scale)
+    return CommonRange(specs, views.reference_shape, max(args.guard, args.border), *scales)
 
 
 def read_extrema(paths: Sequence[Path]) -> pd.DataFrame:

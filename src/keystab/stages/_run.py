@@ -73,6 +73,29 @@ def detector_arguments(to: argparse.ArgumentParser) -> None:
     required(to, "oversampling", "spline or cosine")
 
 
+def view_detector_arguments(to: argparse.ArgumentParser) -> None:
+    """Add what defines the scale-spaces of the views of a set."""
+    required(to, "n-spo", "scales per octave", type=int)
+    own = "; None for each view's own"
+    required(to, "assumed-blur", f"camera blur to assume, pixels{own}", type=optional(float))
+    required(to, "n-oct", "octaves", type=int)
+    balanced = "; None for the balanced one"
+    required(to, "delta-min", f"sampling step, pixels{balanced}", type=optional(float))
+    detector_arguments(to)
+
+
+def store_arguments(to: argparse.ArgumentParser) -> None:
+    """Add where scale-spaces are stored; without them they are streamed."""
+    to.add_argument("--store", type=Path, help="stored scale-space to search")
+    to.add_argument("--store-digest", type=Path, help="seal of --store")
+
+
+def require_both_or_neither(parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
+    """Stop where a store is given without its seal, or a seal without its store."""
+    if (args.store is None) != (args.store_digest is None):
+        parser.error("--store and --store-digest go together: give both or neither")
+
+
 def scale_arguments(to: argparse.ArgumentParser) -> None:
     """Add first scale and ratio of the difference of Gaussians."""
     required(to, "sigma-min", "first scale in pixels", type=float)
@@ -85,6 +108,20 @@ def range_arguments(to: argparse.ArgumentParser) -> None:
     required(to, "first-scale", "lower end of the scale range, over sigma-min", type=float)
     last = "upper end of the scale range, over sigma-min; None for none"
     required(to, "last-scale", last, type=optional(float))
+
+
+def view_range_arguments(to: argparse.ArgumentParser) -> None:
+    """Add what decides which detections of the views of a set are compared."""
+    required(to, "sigma-min", "first scale in pixels", type=float)
+    required(to, "n-oct", "octaves", type=int)
+    required(to, "guard", "guard band of the views, pixels", type=float)
+    range_arguments(to)
+
+
+def refinement_arguments(to: argparse.ArgumentParser) -> None:
+    """Add what decides which refined keypoints are accepted."""
+    required(to, "max-offset", "M_offset", type=float)
+    required(to, "max-iterations", "N_interp", type=int)
 
 
 def same_arguments(to: argparse.ArgumentParser) -> None:

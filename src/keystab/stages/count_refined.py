@@ -19,8 +19,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "n-spo", "n_spo of --samplings", type=int, nargs="+")
     _run.scale_arguments(parser)
     _run.range_arguments(parser)
-    _run.required(parser, "max-offset", "M_offset", type=float)
-    _run.required(parser, "max-iterations", "N_interp", type=int)
+    _run.refinement_arguments(parser)
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
 

@@ -19,13 +19,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "scale-moves", "whether a step may change the scale", type=_run.boolean)
     _run.required(parser, "move", "nearest or unit_step")
     _run.required(parser, "max-offset", "M_offset of unit steps", type=_run.optional(float))
-    parser.add_argument("--store", type=Path, help="stored scale-space to search")
-    parser.add_argument("--store-digest", type=Path, help="seal of --store")
+    _run.store_arguments(parser)
     _run.required(parser, "extrema", "table of extrema to write", type=Path)
     _run.required(parser, "traces", "table of refinement traces to write", type=Path)
     args = parser.parse_args(argv)
-    if (args.store is None) != (args.store_digest is None):
-        parser.error("--store and --store-digest go together: give both or neither")
+    _run.require_both_or_neither(parser, args)
 
     from keystab.detection import extrema_table
     from keystab.dog_space import scale_space

@@ -25,6 +25,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     required(parser, "noise", "standard deviation of the noise", type=float, nargs="+")
     required(parser, "height", "height of the views, pixels", type=_run.optional(int))
     required(parser, "width", "width of the views, pixels", type=_run.optional(int))
+    whole = "whether every view shows the whole reference"
+    required(parser, "whole", whole, type=_run.boolean)
+    required(parser, "guard", "width of the guard band, pixels", type=int)
     required(parser, "dtype", "number type in the store", choices=("float32", "float64"))
     required(parser, "store", "store to write", type=Path)
     required(parser, "digest", "seal of the store to write", type=Path)
@@ -49,11 +52,12 @@ def main(argv: Sequence[str] | None = None) -> None:
         "set": args.set,
         "reference_sha256": digest,
         "reference_blur": args.reference_blur,
+        "reference_shape": list(scene.shape),
     }
     images = (simulate(scene, spec) for spec in specs)
     write_views(images, specs, args.store, attributes, args.dtype)
     write_seal(args.store, args.digest)
-    print(f"{len(specs)} view(s) of {specs[0].shape[0]} x {specs[0].shape[1]} px")
+    print(f"{len(specs)} view(s), the first of {specs[0].shape[0]} x {specs[0].shape[1]} px")
 
 
 if __name__ == "__main__":
