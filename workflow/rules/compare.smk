@@ -297,6 +297,12 @@ def starts_of_sweep(wildcards):
     return Named("starts", [start for start in starts if 2 * start <= end * (1 + 1e-9)])
 
 
+def blur_of_noisy_views(_wildcards):
+    """Camera blur of the views of figure 12, which all share it."""
+    blurs = view_sets.per_view(config["sets"][SWEEPS["noise"][0].name])["blur"]
+    return Named("noise.blur", max(blurs))
+
+
 rule match_sweep:
     """Figures 10 to 12: stability across views against aliasing, unknown blur, noise."""
     input:
@@ -390,6 +396,35 @@ rule crop_views:
             --name noise \
             --values {params.values} \
             --size 64 \
+            --table {output.table:q} \
+            >{log:q} 2>&1
+        """
+
+
+rule noise_theory:
+    """Figure 12: noise of the difference of Gaussians against scale, in closed form."""
+    output:
+        table=f"{RESULTS}/tables/fig12_theory.csv",
+    log:
+        f"{LOGS}/noise_theory.log",
+    benchmark:
+        f"{LOGS}/benchmarks/noise_theory.tsv"
+    params:
+        camera_blur=blur_of_noisy_views,
+        sigma_min=setting("detector.sigma_min"),
+        kappa=setting("detector.kappa"),
+        n_oct=setting(f"sets.{SWEEPS['noise'][0].name}.n_oct"),
+        code=fingerprint("keystab.stages.noise_theory"),
+        software=SOFTWARE,
+    message:
+        "Computing the noise of the difference of Gaussians"
+    shell:
+        """
+        python -m keystab.stages.noise_theory \
+            --camera-blur {params.camera_blur} \
+            --sigma-min {params.sigma_min} \
+            --kappa {params.kappa} \
+            --n-oct {params.n_oct} \
             --table {output.table:q} \
             >{log:q} 2>&1
         """
