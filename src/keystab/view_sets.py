@@ -21,14 +21,16 @@ from keystab.views import ViewSpec, to_reference, to_view
 PER_VIEW = ("blur", "step", "shift_y", "shift_x", "rotation", "noise")
 """What is one number for all views or one number per view."""
 
-#: Value that spreads -> setting that says how far, and base of its Halton sequence. Bases differ,
-#: so that what varies together covers its box evenly.
+#: Value that spreads -> setting that says how far.
 _SPREADS = {
-    "shift_y": ("shift_spread", 2),
-    "shift_x": ("shift_spread", 3),
-    "blur": ("blur_spread", 5),
-    "rotation": ("rotation_spread", 7),
+    "shift_y": "shift_spread",
+    "shift_x": "shift_spread",
+    "rotation": "rotation_spread",
+    "blur": "blur_spread",
 }
+
+#: Bases of the Halton sequences of what spreads, in this order: the smaller, the more even.
+_BASES = (2, 3, 5, 7)
 
 
 class Member(NamedTuple):
@@ -122,12 +124,13 @@ def per_view(views: Mapping[str, Any]) -> dict[str, list[float]]:
             f"blur_spread {views['blur_spread']:g}, allowed is at most blur = "
             f"{min(values['blur']):g}: blurs below 0 do not exist"
         )
-    for key, (spread, base) in _SPREADS.items():
-        if views.get(spread, 0):
-            draws = (2 * _radical_inverse(k + 1, base) - 1 for k in range(n_views))
-            values[key] = [
-                value + views[spread] * draw for value, draw in zip(values[key], draws, strict=True)
-            ]
+    spread_out = [key for key, spread in _SPREADS.items() if views.get(spread, 0)]
+    for key, base in zip(spread_out, _BASES, strict=False):
+        spread = views[_SPREADS[key]]
+        draws = (2 * _radical_inverse(k + 1, base) - 1 for k in range(n_views))
+        values[key] = [
+            value + spread * draw for value, draw in zip(values[key], draws, strict=True)
+        ]
     zoom = views.get("zoom", 1)
     if zoom != 1 and n_views > 1:
         powers = (zoom ** (k / (n_views - 1)) for k in range(n_views))
