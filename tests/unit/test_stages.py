@@ -16,8 +16,10 @@ from keystab.stages import (
     count_refined,
     cut_cubes,
     detect,
+    detect_views,
     match_samplings,
     scale_space,
+    scale_spaces,
     score_features,
     simulate,
 )
@@ -92,6 +94,42 @@ def test_stored_and_streamed_detections_are_the_same_to_the_bit(reference, tmp_p
         assert streamed.read_bytes() == stored.read_bytes()
     found = read_table(tmp_path / "stored.parquet")
     assert len(found) > 10 and (found["n_spo"] == 4).all()
+
+
+def views_arguments(folder: Path, *more: str) -> list[str]:
+    return [
+        *("--views", str(folder / "views"), "--views-digest", str(folder / "views.sha256")),
+        *("--n-spo", "4", "--assumed-blur", "None", "--n-oct", "2", "--delta-min", "None"),
+        *(*DETECTOR, *more),
+    ]
+
+
+def test_stored_and_streamed_detections_of_a_set_are_the_same_to_the_bit(reference, tmp_path):
+    several = {"shift_y": "0.0 0.3", "step": "3 4", "whole": "True", "guard": "2"}
+    assert simulate.main(view_arguments(reference, tmp_path, **several)) == 0
+    stores, seal = str(tmp_path / "stores"), str(tmp_path / "stores.sha256")
+    assert scale_spaces.main(views_arguments(tmp_path, "--store", stores, "--digest", seal)) == 0
+    search = [
+        "--epsilon",
+        "0.0",
+        "--scale-moves",
+        "True",
+        "--move",
+        "nearest",
+        "--max-offset",
+        "None",
+    ]
+    written = {}
+    for how, more in (("streamed", []), ("stored", ["--store", stores, "--store-digest", seal])):
+        tables = [tmp_path / f"{how}_{what}.parquet" for what in ("extrema", "traces")]
+        names = ["--extrema", str(tables[0]), "--traces", str(tables[1])]
+        assert detect_views.main(views_arguments(tmp_path, *search, *names, *more)) == 0
+        written[how] = [table.read_bytes() for table in tables]
+    assert written["streamed"] == written["stored"]
+    found = read_table(tmp_path / "stored_extrema.parquet")
+    assert set(found["view"]) == {0, 1} and set(found["octave"]) == {0, 1}
+    traces = read_table(tmp_path / "stored_traces.parquet")
+    assert set(traces["keypoint"]) == set(range(len(found)))
 
 
 def test_store_of_another_scale_space_is_refused(reference, tmp_path, capsys):
