@@ -6,7 +6,7 @@ CORES ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
 WITH ?=
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
-SNAKEMAKE = snakemake --cores $(CORES)
+SNAKEMAKE = python tools/study.py --cores $(CORES)
 OVERLAY = $(if $(WITH),--configfile $(WITH))
 QUICK = --configfile config/quick.yaml
 
@@ -33,7 +33,7 @@ figures/% results/%: environment FORCE
 	$(SNAKEMAKE) $@ $(OVERLAY)
 
 why: environment ## What would run, and why (TARGET=figures/fig5.pdf: for one file)
-	@$(SNAKEMAKE) --dry-run $(TARGET) $(OVERLAY)
+	@snakemake --dry-run $(TARGET) $(OVERLAY)
 
 test: environment ## All tests
 	pytest -n 2

@@ -1,0 +1,65 @@
+"""How far the study is: weights of jobs, and what is printed."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+TOOL = runpy.run_path(str(Path(__file__).parents[2] / "tools/study.py"))
+Clock, jobs_of, in_words = (TOOL[name] for name in ("Clock", "jobs_of", "in_words"))
+
+DETECT = "Detecting extrema in the views '{}' at n_spo = {}"
+PLAN = f"""Building DAG of jobs...
+[Wed Nov 25 06:04:54 2026]
+Job 3: {DETECT.format("zooms", 3)}
+Reason: Missing output files: results/a.parquet
+Job 4: {DETECT.format("zooms", 15)}
+Job 5: Drawing figures/fig8.pdf
+"""
+
+
+def test_plan_lists_every_job():
+    assert jobs_of(PLAN) == [
+        DETECT.format("zooms", 3),
+        DETECT.format("zooms", 15),
+        "Drawing figures/fig8.pdf",
+    ]
+
+
+def test_jobs_weigh_what_they_took_before():
+    known = {
+        DETECT.format("zooms", 3): 10.0,
+        DETECT.format("zooms", 15): 80.0,
+        "Drawing figures/fig1.pdf": 10.0,
+    }
+    clock = Clock(jobs_of(PLAN), known)
+    assert clock.total == 100.0  # a figure that was never timed counts like another
+    clock.finish(DETECT.format("zooms", 15))
+    assert (
+        clock.line(40.0) == "progress: 1 of 3 jobs, 80 % of the work; 40 s so far, about 10 s to go"
+    )
+    clock.finish(DETECT.format("zooms", 3))
+    clock.finish("Drawing figures/fig8.pdf")
+    assert clock.line(50.0) == "progress: 3 of 3 jobs, 100 % of the work; 50 s so far"
+
+
+def test_nothing_known_and_nothing_to_do():
+    clock = Clock(jobs_of(PLAN), {})
+    clock.finish(jobs_of(PLAN)[0])
+    assert (
+        clock.line(600.0)
+        == "progress: 1 of 3 jobs, 33 % of the work; 10 min so far, about 20 min to go"
+    )
+    assert Clock([], {}).line(1.0) == "progress: 0 of 0 jobs, 100 % of the work; 1 s so far"
+
+
+def test_durations_survive_writing(tmp_path):
+    durations = {DETECT.format("zooms", 3): 1.25, "Drawing a, b": 3.0}
+    TOOL["write_durations"](durations, tmp_path / "d.csv")
+    assert TOOL["read_durations"](tmp_path / "d.csv") == {
+        "Drawing a, b": 3.0,
+        DETECT.format("zooms", 3): pytest.approx(1.2),
+    }
+    assert TOOL["read_durations"](tmp_path / "none.csv") == {}

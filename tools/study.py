@@ -1,0 +1,151 @@
+"""Run Snakemake and say how far the study is and how long it has still to go.
+
+python tools/study.py [arguments of snakemake]                  run it
+python tools/study.py --record tools/durations.csv [arguments]  and write down how long jobs take
+
+Durations of an earlier run weigh the jobs: the same job of the same study takes about the same
+share of the whole on any machine. Jobs that were never timed count like others of their kind.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+DURATIONS = Path(__file__).with_name("durations.csv")
+
+JOB = re.compile(r"^Job (\d+): (.+)$")
+FINISHED = re.compile(r"^Finished jobid: (\d+) ")
+UNKNOWN = 3.0  # seconds, for a job of which nothing is known
+
+
+class Clock:
+    """What has been done, and an estimate of what is left.
+
+    Parameters
+    ----------
+    planned : iterable of str
+        What each job that will run says about itself.
+    durations : dict
+        Seconds that jobs took in an earlier run, by what they say.
+    """
+
+    def __init__(self, planned: Iterable[str], durations: dict[str, float]) -> None:
+        self.planned = list(planned)
+        self.durations = durations
+        self.total = sum(self.weight(job) for job in self.planned)
+        self.done = 0.0
+        self.n_done = 0
+
+    def weight(self, job: str) -> float:
+        """Seconds that a job is expected to take."""
+        if job in self.durations:
+            return self.durations[job]
+        kind = kind_of(job)
+        same = [seconds for other, seconds in self.durations.items() if kind_of(other) == kind]
+        return sum(same) / len(same) if same else UNKNOWN
+
+    def finish(self, job: str) -> None:
+        """Count a job as done."""
+        self.done += self.weight(job)
+        self.n_done += 1
+
+    def line(self, elapsed: float) -> str:
+        """How far the study is, after some seconds."""
+        share = self.done / self.total if self.total else 1.0
+        text = (
+            f"progress: {self.n_done} of {len(self.planned)} jobs, {100 * share:.0f} % of the work"
+        )
+        text += f"; {in_words(elapsed)} so far"
+        if 0 < share < 1:
+            text += f", about {in_words(elapsed * (1 - share) / share)} to go"
+        return text
+
+
+def kind_of(job: str) -> str:
+    """What a job says without numbers and names, the same for all jobs of a rule."""
+    return re.sub(r"'[^']*'|\S*\d\S*", "", job)
+
+
+def in_words(seconds: float) -> str:
+    """Duration for people.
+
+    Examples
+    --------
+    >>> in_words(8), in_words(75), in_words(640)
+    ('8 s', '1 min 15 s', '11 min')
+    """
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    if seconds < 600:
+        return f"{seconds // 60:.0f} min {seconds % 60:.0f} s"
+    return f"{seconds / 60:.0f} min"
+
+
+def jobs_of(output: str) -> list[str]:
+    """What the jobs in Snakemake's output say about themselves."""
+    return [found[2] for line in output.splitlines() if (found := JOB.match(line))]
+
+
+def read_durations(path: Path = DURATIONS) -> dict[str, float]:
+    """Seconds that jobs took, by what they say; empty if nothing was written down."""
+    if not path.is_file():
+        return {}
+    with path.open(newline="", encoding="utf-8") as file:
+        return {row["job"]: float(row["seconds"]) for row in csv.DictReader(file)}
+
+
+def write_durations(durations: dict[str, float], path: Path) -> None:
+    """Write down how long jobs took, in alphabetical order."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["job", "seconds"])
+        writer.writerows((job, f"{durations[job]:.1f}") for job in sorted(durations))
+
+
+def main(arguments: list[str]) -> int:
+    """Plan, run, and report after every job."""
+    record = None
+    if arguments[:1] == ["--record"]:
+        record, arguments = Path(arguments[1]), arguments[2:]
+    snakemake = [sys.executable, "-m", "snakemake"]
+    plan = subprocess.run([*snakemake, "--dry-run", *arguments], capture_output=True, text=True)
+    if plan.returncode:  # says what is wrong
+        return subprocess.run([*snakemake, *arguments]).returncode
+    clock = Clock(jobs_of(plan.stdout + plan.stderr), read_durations())
+    began: dict[str, tuple[str, float]] = {}
+    taken: dict[str, float] = {}
+    start = time.monotonic()
+    with subprocess.Popen(
+        [*snakemake, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        bufsize=1,
+    ) as run:
+        assert run.stdout is not None
+        try:
+            for line in run.stdout:
+                print(line, end="", flush=True)
+                now = time.monotonic()
+                if found := JOB.match(line):
+                    began[found[1]] = (found[2], now)
+                elif (found := FINISHED.match(line)) and found[1] in began:
+                    job, since = began[found[1]]
+                    taken[job] = now - since
+                    clock.finish(job)
+                    print(clock.line(now - start), flush=True)
+        except KeyboardInterrupt:  # Snakemake got it as well, and puts its jobs away
+            print(run.stdout.read(), end="", flush=True)
+    if record is not None and run.returncode == 0:
+        write_durations(taken, record)
+    return run.returncode
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
