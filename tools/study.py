@@ -10,6 +10,7 @@ share of the whole on any machine. Jobs that were never timed count like others 
 from __future__ import annotations
 
 import csv
+import itertools
 import re
 import subprocess
 import sys
@@ -92,6 +93,20 @@ def jobs_of(output: str) -> list[str]:
     return [found[2] for line in output.splitlines() if (found := JOB.match(line))]
 
 
+def config_files(arguments: list[str]) -> list[str]:
+    """Files of settings among the arguments of Snakemake.
+
+    Examples
+    --------
+    >>> config_files(["-c2", "--configfile", "a.yaml", "b.yaml", "--", "figures/fig1.pdf"])
+    ['a.yaml', 'b.yaml']
+    """
+    if "--configfile" not in arguments:
+        return []
+    after = arguments[arguments.index("--configfile") + 1 :]
+    return list(itertools.takewhile(lambda argument: not argument.startswith("-"), after))
+
+
 def read_durations(path: Path = DURATIONS) -> dict[str, float]:
     """Seconds that jobs took, by what they say; empty if nothing was written down."""
     if not path.is_file():
@@ -113,6 +128,10 @@ def main(arguments: list[str]) -> int:
     record = None
     if arguments[:1] == ["--record"]:
         record, arguments = Path(arguments[1]), arguments[2:]
+    missing = [name for name in config_files(arguments) if not Path(name).is_file()]
+    if missing:
+        print(f"error: {missing[0]}: no such file of settings; check WITH=", file=sys.stderr)
+        return 2
     snakemake = [sys.executable, "-m", "snakemake"]
     plan = subprocess.run([*snakemake, "--dry-run", *arguments], capture_output=True, text=True)
     if plan.returncode:  # says what is wrong

@@ -63,3 +63,9 @@ def test_durations_survive_writing(tmp_path):
         DETECT.format("zooms", 3): pytest.approx(1.2),
     }
     assert TOOL["read_durations"](tmp_path / "none.csv") == {}
+
+
+def test_missing_settings_get_one_line(capsys):
+    assert TOOL["main"](["--cores", "1", "--configfile", "nowhere.yaml"]) == 2
+    said = capsys.readouterr().err
+    assert said == "error: nowhere.yaml: no such file of settings; check WITH=\n"
