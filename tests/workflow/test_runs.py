@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from project import copy_of_project
 
 TINY = """
 sets: {still: {step: 40}, examples: {step: [40, 28, 20]}}
@@ -59,6 +60,45 @@ def test_figure_from_picture_and_nothing_to_do_afterwards(project):
     assert run.returncode == 0, run.stdout
     assert (project.folder / target).read_bytes().startswith(b"%PDF")
     assert project.would_run(*tiny(project), "--", target) == {}
+
+
+SETS = """
+sets:
+  still: {step: 40}
+  examples: {step: [40, 28, 20]}
+  translations: {n_views: 3, step: 40, n_spo: [3, 5]}
+  zooms: {n_views: 3, step: 40, n_spo: [3, 5]}
+  rotations: {n_views: 3, step: 40, n_spo: [3, 5]}
+  shipped: {n_views: 2, step: 40}
+  aliasing: {n_views: 2, step: 40, n_spo: [4]}
+  unknown_blur: {n_views: 3, step: 40, n_spo: [4], sweep: {blur_spread: [0.1, 0.4]}}
+  noise: {n_views: 2, step: 40, n_spo: [4], sweep: {noise: [0.01, 0.02]}}
+  blur_errors: {blur: [0.7, 0.3], step: 40, n_spo: [4]}
+stability: {curve_n_spo: [3, 5], n_resamples: 100}
+samplings: {n_spo: [3, 4]}
+keep_scale_spaces: KEEP
+results: results/tiny
+figures: figures/tiny
+logs: logs/tiny
+"""
+
+
+def test_tables_of_sets_depend_on_neither_cores_nor_stores(tmp_path):
+    targets = [f"results/tiny/tables/{name}_curves.csv" for name in ("fig8", "fig11")]
+    written = {}
+    for how, keep, cores in (("streamed", "false", "1"), ("stored", "true", "2")):
+        project = copy_of_project(tmp_path / how, own_library=False)
+        (project.folder / "config/tiny.yaml").write_text(SETS.replace("KEEP", keep))
+        run = project.snakemake(
+            "--cores", cores, "--configfile", "config/tiny.yaml", "--", *targets
+        )
+        assert run.returncode == 0, run.stdout
+        tables = sorted((project.folder / "results/tiny/tables").iterdir())
+        written[how] = {table.name: table.read_bytes() for table in tables}
+        stores = project.folder / "results/tiny/scale_space/zooms/n3"
+        assert stores.is_dir() == (how == "stored")
+    assert len(written["streamed"]) == 6
+    assert written["streamed"] == written["stored"]
 
 
 def test_failing_job_shows_its_one_line_and_leaves_no_output(project):
