@@ -19,6 +19,7 @@ include: "workflow/rules/scale_space.smk"  # a view -> a stored scale-space, whe
 include: "workflow/rules/detect.smk"  # a view or its scale-space -> extrema, with refinement traces
 include: "workflow/rules/match.smk"  # extrema of many samplings -> tables
 include: "workflow/rules/compare.smk"  # extrema of many views -> tables
+include: "workflow/rules/floor.smk"  # views -> extrema in variants of the arithmetic -> tables
 include: "workflow/rules/figures.smk"  # tables -> figures
 
 

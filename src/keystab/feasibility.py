@@ -96,6 +96,12 @@ def setting_problems(settings: Settings) -> list[str]:
         problems.append("sets.still has several views; figures 3 to 6 study a single one")
     else:
         problems += _scale_below_blur(settings) or searched_problems(settings)
+    problems += [
+        f"floor.variants.{name}.set is {variant['set']}, allowed are sets of views: "
+        f"{', '.join(settings['sets'])}"
+        for name, variant in settings["floor"]["variants"].items()
+        if variant["set"] not in settings["sets"]
+    ]
     problems += _order(settings["comparison"], "comparison", "unstable_below", "stable_above")
     if settings["comparison"]["last_scale"] is not None:
         problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")

@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.features import condition_numbers, hessians
+from keystab.intervals import wilson_interval
 from keystab.matching import matches, unique_keypoints
 from keystab.stability import new_and_lost
 
@@ -79,6 +80,40 @@ def change_counts(
     found = extrema["n_spo"].value_counts()
     counts.insert(2, "n_extrema", [int(found.get(n_spo, 0)) for n_spo in steps])
     return counts
+
+
+def floor_summary(counts: pd.DataFrame, stability: pd.Series, settles_at: int) -> pd.DataFrame:
+    """Rates of new and lost extrema where they have settled, in one row (figure floor).
+
+    Parameters
+    ----------
+    counts : DataFrame
+        From `change_counts`.
+    stability : Series
+        Share of the samplings in which each unique keypoint is detected.
+    settles_at : int
+        Rates are those of the samplings with at least this `n_spo`, weighted by their detections.
+
+    Returns
+    -------
+    DataFrame
+        ``mean_common`` (compared detections per sampling), ``new_rate, new_low, new_high``,
+        ``lost_rate, lost_low, lost_high`` (shares with 95 % Wilson intervals), ``n_unique``,
+        ``share_always`` with ``low_always, high_always``; NaN where nothing is detected.
+    """
+    settled = counts[counts["n_spo"] >= settles_at]
+    row: dict[str, float] = {"mean_common": settled["n_common"].mean()}
+    for name in ("new", "lost"):
+        known = settled[settled[f"n_{name}"].notna()]
+        k, n = int(known[f"n_{name}"].sum()), int(known["n_common"].sum())
+        low, high = wilson_interval(k, n)
+        row |= {f"{name}_rate": k / n if n else np.nan}
+        row |= {f"{name}_low": float(low), f"{name}_high": float(high)}
+    always = int((stability == 1).sum())
+    low, high = wilson_interval(always, len(stability))
+    row |= {"n_unique": len(stability), "share_always": always / max(len(stability), 1)}
+    row |= {"low_always": float(low), "high_always": float(high)}
+    return pd.DataFrame([row])
 
 
 class Matched(NamedTuple):

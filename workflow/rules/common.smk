@@ -155,3 +155,9 @@ def kappas(_wildcards):
     """Ratios of the difference of Gaussians that figure 9 compares, smallest first."""
     fractions = sorted(config["kappas"]["fractions"], reverse=True)
     return Named("kappas.fractions", [2 ** (1 / fraction) for fraction in fractions])
+
+
+def dtype_of_set(wildcards):
+    """Number type in which the views of a set are stored."""
+    own = config["sets"][wildcards.set]["dtype"]
+    return Named("dtype", config["views_dtype"] if own is None else own)

@@ -30,7 +30,7 @@ rule simulate:
         width=setting("sets.{set}.width"),
         whole=setting("sets.{set}.whole"),
         guard=setting("sets.{set}.guard"),
-        dtype=setting("views_dtype"),
+        dtype=dtype_of_set,
         code=fingerprint("keystab.stages.simulate"),
         software=SOFTWARE,
     message:

@@ -1,0 +1,61 @@
+"""Detect the extrema of all balanced samplings in one variant of the arithmetic (figure floor)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from keystab.stages import _run
+
+
+@_run.stage
+def main(argv: Sequence[str] | None = None) -> None:
+    """Read the view; write one table of the extrema of all samplings."""
+    parser = _run.parser(__doc__)
+    _run.views_arguments(parser)
+    _run.required(parser, "n-spo", "scales per octave of the samplings", type=int, nargs="+")
+    _run.detector_arguments(parser)
+    _run.required(parser, "epsilon", "least difference to the 26 neighbours", type=float)
+    _run.required(parser, "grey-range", "largest grey value", type=float)
+    _run.required(parser, "arithmetic", "type of samples", choices=("float64", "float32"))
+    _run.required(parser, "bits", "bits of a pixel; None for floats", type=_run.optional(int))
+    _run.required(parser, "extrema", "table of extrema to write", type=Path)
+    args = parser.parse_args(argv)
+
+    import pandas as pd
+
+    from keystab.detection import extrema_table
+    from keystab.dog_space import scale_space
+    from keystab.extrema import discrete_extrema
+    from keystab.progress import progress
+    from keystab.single_precision import quantised, single_precision_extrema
+    from keystab.stages._inputs import read_view
+    from keystab.tables import write_table
+
+    view = read_view(args.views, args.views_digest)
+    image = quantised(view.image, args.bits)
+    parts = []
+    for n_spo in progress(args.n_spo, len(args.n_spo), "samplings"):
+        space = scale_space(
+            image,
+            view.blur,
+            n_spo=n_spo,
+            sigma_min=args.sigma_min,
+            kappa=args.kappa,
+            oversampling=args.oversampling,
+        )
+        if args.arithmetic == "float32":
+            found = single_precision_extrema(space, args.epsilon, args.grey_range)
+        else:
+            found = discrete_extrema(space, args.epsilon / args.grey_range)
+        table = extrema_table(space, found)[["y", "x", "sigma", "value", "sign", "step_sigma"]]
+        table.insert(0, "n_spo", n_spo)
+        table.insert(1, "delta_min", space.sampling.delta_min)
+        parts.append(table)
+    extrema = pd.concat(parts, ignore_index=True)
+    write_table(extrema, args.extrema)
+    print(f"{len(extrema)} extrema in {len(args.n_spo)} samplings")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
