@@ -31,7 +31,8 @@ include: "workflow/rules/figures.smk"  # tables -> figures
 #   fig4  extrema that come and go as the sampling gets finer   fig4_*.csv
 #   fig5  features against stability                            fig5_*.csv
 #   fig6  iso-surfaces around stable and unstable keypoints     fig6.csv, fig6_cubes.parquet
-FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6"]
+#   floor why extrema come and go at any density                floor_*.csv
+FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "floor"]
 
 
 rule all:

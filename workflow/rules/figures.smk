@@ -132,3 +132,22 @@ use rule fig1 as fig6 with:
         module="keystab.figures.fig6",
         code=fingerprint("keystab.figures.fig6"),
         software=SOFTWARE,
+
+
+use rule fig1 as floor with:
+    input:
+        f"{RESULTS}/tables/floor_rates.csv",
+        f"{RESULTS}/tables/floor_summary.csv",
+    output:
+        pdf=f"{DRAWN}/floor.pdf",
+        png=report(f"{DRAWN}/floor.png", caption="../report/floor.rst", category="Figures"),
+    log:
+        f"{LOGS}/floor.log",
+    benchmark:
+        f"{LOGS}/benchmarks/floor.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.floor",
+        code=fingerprint("keystab.figures.floor"),
+        software=SOFTWARE,

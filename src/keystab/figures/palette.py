@@ -50,6 +50,14 @@ FEATURE_COLOURS = {
 CHANGE_COLOURS = {"new": "#009E73", "lost": "#D55E00"}
 """Detections that a change of the sampling adds and removes (figure 4)."""
 
+TOLERANCE_COLOURS = {
+    "usual": INK,
+    "epsilon_1e7": "#0072B2",
+    "epsilon_1e6": "#A8216B",
+    "epsilon_1e5": "#D55E00",
+}
+"""Tolerances of the comparison with neighbours (figure floor)."""
+
 BALANCED_COLOUR = INK
 """The balanced sampling curve."""
 

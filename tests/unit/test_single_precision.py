@@ -1,0 +1,103 @@
+"""The variants of figure floor: single precision, integers, and the summary of rates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from scenes import blobs
+
+from keystab.dog_space import scale_space
+from keystab.errors import InputError
+from keystab.extrema import discrete_extrema, extrema_of_array
+from keystab.figures import floor
+from keystab.sampling_tables import floor_summary
+from keystab.single_precision import quantised, single_precision_extrema, single_precision_window
+
+
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
+@pytest.mark.parametrize("grey_range", [1.0, 255.0])
+def test_samples_are_those_of_double_precision_to_the_last_digit(oversampling, grey_range):
+    space = scale_space(blobs((40, 50), 1), 1.1, 5, oversampling=oversampling)
+    window = single_precision_window(space, (3, 60), (5, 90), grey_range)
+    exact = space.window(slice(None), slice(3, 60), slice(5, 90)) * grey_range
+    assert window.dtype == np.float32
+    # Two Gaussians, each rounded to half a last digit of a value below the grey range.
+    assert np.abs(window - exact).max() <= grey_range * 2.0**-24 * 2.01
+    assert np.abs(window - exact).max() > 0
+
+
+def test_strong_extrema_survive_single_precision_and_weak_ones_do_not():
+    image = blobs((50, 60), 2)
+    weak = 0.5 + 1e-5 * (image - 0.5)
+    for picture, survive in ((image, True), (weak, False)):
+        space = scale_space(picture, 1.1, 12)
+        exact = {tuple(row) for row in discrete_extrema(space)}
+        single = {tuple(row) for row in single_precision_extrema(space)}
+        assert len(exact) > 20
+        assert (len(exact & single) > 0.7 * len(exact)) == survive
+
+
+def test_blocks_do_not_show(monkeypatch):
+    space = scale_space(blobs((30, 40), 3), 1.1, 4)
+    whole = single_precision_window(space, (0, space.shape[1]), (0, space.shape[2]))
+    expected = extrema_of_array(whole, 1e-7)
+    monkeypatch.setattr("keystab.single_precision._BLOCK", 16)
+    assert {tuple(row) for row in single_precision_extrema(space, 1e-7)} == {
+        tuple(row) for row in expected
+    }
+
+
+def test_integers_hold_what_their_bits_can():
+    values = np.linspace(0, 1, 1001)
+    assert len(np.unique(quantised(values, 8))) == 256
+    assert np.abs(quantised(values, 8) - values).max() <= 0.5 / 255 + 1e-15
+    assert quantised(values, None) is values
+
+
+def test_wrong_numbers_are_named():
+    space = scale_space(np.ones((12, 12)), 1.1, 3)
+    for wrong in ({"epsilon": -1.0}, {"grey_range": 0.0}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            single_precision_extrema(space, **wrong)
+
+
+COUNTS = pd.DataFrame(
+    {
+        "n_spo": [13, 14, 15],
+        "n_common": [100, 200, 300],
+        "n_new": pd.array([None, 20, 10], dtype="Int64"),
+        "n_lost": pd.array([50, 20, None], dtype="Int64"),
+    }
+)
+
+
+def test_settled_rates_are_weighted_by_their_detections():
+    row = floor_summary(COUNTS, pd.Series([1.0, 1.0, 0.5, 0.1]), 14).iloc[0]
+    assert row["mean_common"] == 250
+    assert row["new_rate"] == 30 / 500 and row["lost_rate"] == 20 / 200  # nothing follows the last
+    assert row["new_low"] < row["new_rate"] < row["new_high"]
+    assert row["n_unique"] == 4 and row["share_always"] == 0.5
+    assert np.isnan(floor_summary(COUNTS, pd.Series([], dtype=float), 99)["new_rate"].item())
+
+
+def test_the_figure_shows_every_variant():
+    names = ["usual", "epsilon_1e6", "of_my_own"]
+    rates = [
+        {"variant": name, "n_spo": n, "new_rate": r, "new_low": r / 2, "new_high": 2 * r}
+        for name in names
+        for n, r in ((3, np.nan), (9, 0.1), (15, 0.05))
+    ]
+    summary = floor_summary(COUNTS, pd.Series([1.0, 0.2]), 14)
+    tables = {
+        "floor_rates": pd.DataFrame(rates),
+        "floor_summary": pd.concat([summary.assign(variant=name) for name in names]),
+    }
+    figure = floor.draw(tables)
+    panels = {ax.get_label(): ax for ax in figure.axes}
+    assert set(panels) == {"a", "b", "c"}
+    labels = [text.get_text() for text in panels["b"].get_yticklabels()]
+    assert labels == ["no tolerance", "tolerance 1e-6", "of_my_own"]
+    lines = {line.get_label(): line for line in panels["a"].lines}
+    assert lines["usual"].get_ydata().tolist() == [10.0, 5.0]
+    assert "of_my_own" not in lines
