@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import threadpoolctl
@@ -93,9 +93,9 @@ class ScaleSpace:
     @cached_property
     def axes(self) -> tuple[AxisOperator, AxisOperator]:
         """Operators of the y axis and of the x axis."""
-        kind = SplineAxis if self.oversampling == "spline" else CosineAxis
+        blurs = tuple(self.blurs[0].tolist())
         y_axis, x_axis = (
-            kind(m, n, self.sampling.delta_min, self.sampling.stride, self.blurs[0])
+            _axis(self.oversampling, m, n, self.sampling.delta_min, self.sampling.stride, blurs)
             for m, n in zip(self.sampling.base_grid_shape, self.sampling.shape, strict=True)
         )
         return (y_axis, x_axis)
@@ -337,6 +337,20 @@ def scale_space(
         slices,
     )
     return ScaleSpace(array, sampling, oversampling)
+
+
+@lru_cache(maxsize=8)
+def _axis(
+    oversampling: str,
+    n_samples: int,
+    n_pixels: int,
+    delta_min: float,
+    stride: int,
+    blurs: tuple[float, ...],
+) -> AxisOperator:
+    """Operator of one axis, shared by all images of one size that are sampled alike."""
+    kind = SplineAxis if oversampling == "spline" else CosineAxis
+    return kind(n_samples, n_pixels, delta_min, stride, np.array(blurs))
 
 
 def checked_image(image: np.ndarray) -> np.ndarray:

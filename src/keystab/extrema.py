@@ -18,7 +18,7 @@ import numpy as np
 import threadpoolctl
 from numba import njit
 
-from keystab import checks, memory
+from keystab import checks, interpolated_search, memory
 from keystab.dog_space import ScaleSpace, ranges
 from keystab.operators import Block
 from keystab.progress import progress
@@ -69,20 +69,56 @@ def discrete_extrema(
         f"delta_min = {space.sampling.delta_min:.4g}",
         "crop the picture, or use fewer scales or a larger delta_min",
     )
-    found: list[np.ndarray] = []
-    columns = list(ranges(1, space.shape[2] - 1, BLOCK_COLUMNS))
     tolerance = max(epsilon, space.rounding)
     space.source, space.axes, space.blurs  # noqa: B018  made once, before threads share them
+    what = f"extrema, n_spo {space.sampling.n_spo}" if show_progress else None
     with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
-        for top, bottom in ranges(1, space.shape[1] - 1, BAND_ROWS):
-            rows = list(ranges(top, bottom, BLOCK_ROWS))
-            along = list(pool.map(lambda r: space.axes[0].block(r[0] - 1, r[1] + 1), rows))
-            search = partial(_search_column, space, rows, along, tolerance)
-            searches = pool.map(search, columns)
-            what = f"extrema, n_spo {space.sampling.n_spo}"
-            found += progress(searches, len(columns), what) if show_progress else searches
+        search = _interpolated if interpolated_search.applies(space) else _evaluated
+        found = search(space, tolerance, pool, what)
     extrema = np.concatenate([np.empty((0, 4), dtype=np.int64), *found])
     return extrema[np.lexsort((extrema[:, 2], extrema[:, 1], extrema[:, 0]))]
+
+
+def _evaluated(
+    space: ScaleSpace, tolerance: float, pool: ThreadPoolExecutor, what: str | None
+) -> list[np.ndarray]:
+    """Extrema from all samples, evaluated block by block."""
+    found: list[np.ndarray] = []
+    columns = list(ranges(1, space.shape[2] - 1, BLOCK_COLUMNS))
+    for top, bottom in ranges(1, space.shape[1] - 1, BAND_ROWS):
+        rows = list(ranges(top, bottom, BLOCK_ROWS))
+        along = list(pool.map(lambda r: space.axes[0].block(r[0] - 1, r[1] + 1), rows))
+        searches = pool.map(partial(_search_column, space, rows, along, tolerance), columns)
+        found += progress(searches, len(columns), what) if what else searches
+    return found
+
+
+def _interpolated(
+    space: ScaleSpace, tolerance: float, pool: ThreadPoolExecutor, what: str | None
+) -> list[np.ndarray]:
+    """Extrema from few samples and a bound on what lies between; see `interpolated_search`."""
+    search = interpolated_search.InterpolatedSearch(space, tolerance)
+    searches = pool.map(partial(_search_interpolated, search), range(search.n_columns))
+    found = list(progress(searches, search.n_columns, what) if what else searches)
+    # Columns of blocks overlap by the samples that have no neighbours in one of them.
+    return [np.unique(np.concatenate(found), axis=0)]
+
+
+def _search_interpolated(search: interpolated_search.InterpolatedSearch, column: int) -> np.ndarray:
+    """Extrema of one column of blocks: candidates, and what has too many of them, decided."""
+    space, tolerance = search.space, search.tolerance
+    candidates, undecided = search.candidates(column)
+    dense = [
+        extrema_of_array(
+            space.window(
+                slice(None), slice(top, top + search.length), slice(left, left + search.abreast)
+            ),
+            tolerance - space.rounding / 2,
+            (top, left),
+        )
+        for top, left in undecided
+    ]
+    return decided(space, np.unique(np.concatenate([candidates, *dense]), axis=0), tolerance)
 
 
 def decided(space: ScaleSpace, candidates: np.ndarray, tolerance: float) -> np.ndarray:

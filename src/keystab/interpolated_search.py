@@ -1,0 +1,579 @@
+r"""Search of a finely sampled scale-space from few of its samples.
+
+A balanced scale-space at n_spo = 15 holds twelve samples per standard deviation of its narrowest
+Gaussian, far more than its shape needs. Here a block of samples is evaluated at some *nodes* only,
+rows and columns near those of Chebyshev, and expanded to all its samples by the polynomial through
+the nodes, in single precision. How far that can be from the truth is bounded, so that what is
+reported holds every extremum and a few samples more, which the caller decides exactly.
+
+**Bound.** Rows L of an axis and their polynomial expansion E N (N: the rows at the nodes) differ by
+R = L - E N. Of R the part that does not annihilate cubic polynomials is split off, R = R_0 + Q with
+Q on four columns; summing R_0 four times gives R_0' with
+:math:`|R_0 C| = |R_0' \Delta^4 C| \le \|R_0'\|_1 \max|\Delta^4 C|`, since splines and Gaussians map
+cubics to cubics and Q is of the order of rounding away from the borders. With C the source,
+
+.. math:: L_y C L_x^T - E_y N_y C N_x^T E_x^T = R_y C L_x^T + (L_y - R_y) C R_x^T
+
+so that, with :math:`e = \|R_0'\|_1 \max|\Delta^4 C| + \|Q\|_1 \max|C|` along each axis over the
+source that the block sees, a Gaussian is off by at most
+:math:`\|L_x\|_1 e_y + (\|L_y\|_1 + \|R_y\|_1) e_x`, and a slice by the sum over its two Gaussians.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from keystab.dog_space import ScaleSpace
+from keystab.operators import Block, SplineAxis
+
+# Length of a block along either axis in standard deviations of 1.1 px, and nodes in it.
+_LENGTH, _NODES = 2.8, 12
+
+# Blocks that one column of blocks is wide: its Gaussians, slices and samples stay in the cache.
+_ABREAST = 4
+
+# Fewer samples than this per block gain nothing against evaluating all of them.
+_LEAST = 24
+
+# From this blur on, in pixels, the interpolation errs so little that its bound need not be local.
+_SMOOTH = 1.3
+
+# Slices whose lower Gaussian has a smaller blur, in pixels, show the kinks of the spline, which no
+# polynomial follows: they are evaluated at all samples.
+_KINKED = 0.6
+
+# Relative error of single precision.
+_UNIT = 2.0**-24
+
+
+def applies(space: ScaleSpace) -> bool:
+    """Whether a scale-space is sampled finely enough, and its rows are local."""
+    length = block_length(space)
+    if space.oversampling != "spline" or length < _LEAST:
+        return False
+    if min(space.shape[1], space.shape[2]) < _ABREAST * length:
+        return False
+    axis = space.axes[0]
+    assert isinstance(axis, SplineAxis)
+    # Rows of ringing kernels have all columns.
+    return not (axis.rows.table >= 0).any() and bool((axis.rows.reach < axis.rows.n_samples).all())
+
+
+def block_length(space: ScaleSpace) -> int:
+    """Samples of a block along either axis."""
+    sampling = space.sampling
+    return min(48, int(_LENGTH * sampling.sigma_min / sampling.delta_min))
+
+
+@lru_cache(maxsize=8)
+def expansion(length: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Nodes of a block, and the matrix from values there to values at all its samples.
+
+    Parameters
+    ----------
+    length : int
+        Samples of the block.
+
+    Returns
+    -------
+    nodes : ndarray of int, shape (n_nodes,)
+    expand : ndarray, shape (length, n_nodes)
+        Lagrange's polynomials of the nodes at all samples.
+
+    Examples
+    --------
+    >>> nodes, expand = expansion(32)
+    >>> x = np.arange(32.0)
+    >>> bool(np.abs(expand @ nodes**3.0 - x**3).max() < 1e-9)
+    True
+    """
+    angle = np.pi * (2 * np.arange(_NODES) + 1) / (2 * _NODES)
+    stretch = np.cos(np.pi / (2 * _NODES))  # the outermost nodes are the first and the last sample
+    nodes = np.rint((1 - np.cos(angle) / stretch) / 2 * (length - 1)).astype(np.int64)
+    place = np.arange(length)
+    expand = np.ones((length, _NODES))
+    for k, node in enumerate(nodes):
+        others = np.delete(nodes, k)
+        expand[:, k] = np.prod((place[:, None] - others) / (node - others), axis=1)
+    return nodes, expand
+
+
+@dataclass(frozen=True)
+class AxisBlocks:
+    r"""Node rows of all blocks of an axis, and what bounds their interpolation.
+
+    Attributes
+    ----------
+    start : ndarray of int, shape (n_blocks,)
+        First sample of every block; the last ones may overlap.
+    first, width : ndarray of int, shape (n_blocks, n_blurs)
+        First column of the source, and columns, of every block and blur.
+    offset : ndarray of int, shape (n_blocks, n_blurs)
+        Where the entries of a block's node rows begin, row by row.
+    entries : ndarray
+        Node rows of all blocks and blurs.
+    smooth, rough, norm, residual : ndarray, shape (n_blocks, n_blurs)
+        Largest :math:`\|R_0'\|_1`, :math:`\|Q\|_1`, :math:`\|L\|_1` and
+        :math:`\|R\|_1` of a row.
+    """
+
+    start: NDArray[np.int64]
+    first: NDArray[np.int64]
+    width: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    entries: NDArray[np.float64]
+    smooth: NDArray[np.float64]
+    rough: NDArray[np.float64]
+    norm: NDArray[np.float64]
+    residual: NDArray[np.float64]
+
+
+def axis_blocks(axis: SplineAxis | _From, n_samples: int, length: int, step: int) -> AxisBlocks:
+    """Evaluate the rows of all blocks of an axis, keep those of the nodes, bound the others.
+
+    Parameters
+    ----------
+    axis : SplineAxis
+        The axis.
+    n_samples : int
+        Samples of this octave along the axis, at least `length`.
+    length, step : int
+        Samples of a block, and from one block to the next.
+    """
+    nodes, expand = expansion(length)
+    starts = np.minimum(np.arange(0, max(n_samples - length, 0) + step, step), n_samples - length)
+    starts = np.unique(starts)
+    n_blurs = axis.rows.reach.size
+    shape = (starts.size, n_blurs)
+    first, width, offset = (np.zeros(shape, dtype=np.int64) for _ in range(3))
+    bounds = [np.zeros(shape) for _ in range(4)]
+    entries, size = [], 0
+    for i, start in enumerate(starts):
+        block = axis.block(int(start), int(start) + length)
+        for blur in range(n_blurs):
+            rows = block.factor(blur)
+            kept = np.ascontiguousarray(rows[nodes])
+            first[i, blur], width[i, blur] = block.first[blur], rows.shape[1]
+            offset[i, blur] = size
+            size += kept.size
+            entries.append(kept.ravel())
+            for bound, value in zip(bounds, _row_bounds(rows, rows - expand @ kept), strict=True):
+                bound[i, blur] = value
+    return AxisBlocks(starts, first, width, offset, np.concatenate(entries), *bounds)
+
+
+def _row_bounds(
+    rows: NDArray[np.float64], residual: NDArray[np.float64]
+) -> tuple[float, float, float, float]:
+    """Norms of `AxisBlocks` for the rows of one block and blur."""
+    n_columns = rows.shape[1]
+    norm = float(np.abs(rows).sum(axis=1).max())
+    size = float(np.abs(residual).sum(axis=1).max())
+    if n_columns < 8:
+        return 0.0, size, norm, size
+    middle = n_columns // 2 - 2
+    place = np.arange(n_columns) - (middle + 1.5)
+    powers = place[None, :] ** np.arange(4)[:, None]
+    moments = residual @ powers.T
+    split = np.linalg.solve(powers[:, middle : middle + 4], moments.T).T
+    annihilating = residual.copy()
+    annihilating[:, middle : middle + 4] -= split
+    for _ in range(4):
+        annihilating = np.cumsum(annihilating, axis=1)
+    smooth = float(np.abs(annihilating[:, :-4]).sum(axis=1).max())
+    # What the sums do not bring to zero at the end is rounding, and counted with the rough part.
+    left = np.abs(annihilating[:, -4:]).sum(axis=1)
+    rough = float((np.abs(split).sum(axis=1) + 16 * left).max())
+    return smooth, rough, norm, size
+
+
+def error_bounds(
+    space: ScaleSpace, y_blocks: AxisBlocks, x_blocks: AxisBlocks
+) -> NDArray[np.float64]:
+    """Bound of the interpolation error of every slice, row of blocks and group of blocks abreast.
+
+    Returns
+    -------
+    ndarray, shape (n_y_blocks, n_x_groups, n_slices)
+    """
+    blurs, lower, upper = space.blurs
+    source = space.source
+    absolute = np.abs(source)
+    changes = [np.abs(np.diff(source, 4, axis=axis)) for axis in (0, 1)]
+    overall = [float(a.max(initial=0.0)) for a in (absolute, *changes)]
+    n_y, n_x = y_blocks.start.size, -(-x_blocks.start.size // _ABREAST)
+    bound = np.empty((n_y, n_x, blurs.size))
+    groups = [slice(k * _ABREAST, (k + 1) * _ABREAST) for k in range(n_x)]
+
+    def worst(values: NDArray[np.float64], blur: int) -> NDArray[np.float64]:
+        return np.array([values[group, blur].max() for group in groups])
+
+    for blur in range(blurs.size):
+        if blurs[blur] < _SMOOTH:
+            rows = _ranges(y_blocks.first[:, blur], y_blocks.width[:, blur])
+            columns = [
+                (
+                    int(x_blocks.first[group, blur].min()),
+                    int((x_blocks.first[group, blur] + x_blocks.width[group, blur]).max()),
+                )
+                for group in groups
+            ]
+            level, along_y, along_x = (
+                _local_maxima(values, rows, columns) for values in (absolute, *changes)
+            )
+        else:
+            level, along_y, along_x = (np.full((n_y, n_x), value) for value in overall)
+        e_y = y_blocks.smooth[:, blur, None] * along_y + y_blocks.rough[:, blur, None] * level
+        e_x = worst(x_blocks.smooth, blur) * along_x + worst(x_blocks.rough, blur) * level
+        bound[:, :, blur] = worst(x_blocks.norm, blur) * e_y
+        bound[:, :, blur] += (y_blocks.norm[:, blur] + y_blocks.residual[:, blur])[:, None] * e_x
+    return bound[:, :, lower] + bound[:, :, upper]
+
+
+def _ranges(first: NDArray[np.int64], width: NDArray[np.int64]) -> list[tuple[int, int]]:
+    return [(int(a), int(a + n)) for a, n in zip(first, width, strict=True)]
+
+
+def _local_maxima(
+    values: NDArray[np.float64], rows: list[tuple[int, int]], columns: list[tuple[int, int]]
+) -> NDArray[np.float64]:
+    """Largest value in every box of a range of rows and a range of columns; 0 in empty ones."""
+    bands = np.stack([values[a:b].max(axis=0, initial=0.0) for a, b in rows])
+    return np.stack([bands[:, a:b].max(axis=1, initial=0.0) for a, b in columns], axis=1)
+
+
+@lru_cache(maxsize=4)
+def _blocks_of(axis: SplineAxis, n_samples: int, length: int, step: int) -> AxisBlocks:
+    return axis_blocks(axis, n_samples, length, step)
+
+
+class WholeRows(NamedTuple):
+    """All rows of blocks for some blurs, for compiled code.
+
+    Attributes
+    ----------
+    first, width, offset : ndarray of int, shape (n_blocks, n_blurs)
+        First column of the source, columns, and where the entries begin.
+    entries : ndarray
+        Rows of all blocks and blurs, row by row.
+    length : int
+        Rows of a block.
+    """
+
+    first: NDArray[np.int64]
+    width: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    entries: NDArray[np.float64]
+    length: int
+
+    def rows(self, block: int, blur: int) -> tuple[NDArray[np.float64], int]:
+        """Rows of one block and blur, and their first column."""
+        width, start = self.width[block, blur], self.offset[block, blur]
+        rows = self.entries[start : start + self.length * width].reshape(self.length, width)
+        return rows, int(self.first[block, blur])
+
+
+@lru_cache(maxsize=8)
+def _whole_rows(
+    axis: SplineAxis, starts: tuple[int, ...], length: int, blurs: tuple[int, ...]
+) -> WholeRows:
+    first, width, offset = (np.zeros((len(starts), len(blurs)), dtype=np.int64) for _ in range(3))
+    entries, size = [np.empty(0)], 0
+    for i, start in enumerate(starts):
+        block = axis.block(start, start + length)
+        for k, blur in enumerate(blurs):
+            rows = block.factor(blur)
+            first[i, k], width[i, k], offset[i, k] = block.first[blur], rows.shape[1], size
+            size += rows.size
+            entries.append(rows.ravel())
+    return WholeRows(first, width, offset, np.concatenate(entries), length)
+
+
+def _in_single_precision(rows: WholeRows) -> WholeRows:
+    return rows._replace(entries=rows.entries.astype(np.float32))
+
+
+class InterpolatedSearch:
+    """Candidates for extrema of a scale-space, one column of blocks at a time.
+
+    Parameters
+    ----------
+    space : ScaleSpace
+        The octave, for which `applies` is true.
+    tolerance : float
+        By how much an extremum differs from each of its 26 neighbours.
+    """
+
+    def __init__(self, space: ScaleSpace, tolerance: float) -> None:
+        self.space, self.tolerance = space, tolerance
+        length = self.length = block_length(space)
+        y_axis, x_axis = space.axes
+        assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
+        # Samples at the rim of a block have no neighbours in it, so that blocks overlap.
+        self.y_blocks = _blocks_of(y_axis, space.shape[1], length, length - 2)
+        self.abreast = _ABREAST * length
+        x_starts = np.unique(
+            np.minimum(
+                np.arange(0, space.shape[2] - 2, self.abreast - 2),
+                space.shape[2] - self.abreast,
+            )
+        )
+        self.x_starts = x_starts
+        self.x_blocks = _abreast_blocks(x_axis, tuple(int(s) for s in x_starts), length)
+        self.bounds = error_bounds(space, self.y_blocks, self.x_blocks)
+        blurs, lower, upper = space.blurs
+        self.n_kinked = int((blurs[lower] < _KINKED).sum())  # the first slices
+        self.bounds[:, :, : self.n_kinked] = 0.0
+        kinked = np.unique([lower[: self.n_kinked], upper[: self.n_kinked]])
+        self.kinked = tuple(int(blur) for blur in kinked)
+        y_starts = tuple(int(start) for start in self.y_blocks.start)
+        self.y_rows = _in_single_precision(_whole_rows(y_axis, y_starts, length, self.kinked))
+        self.x_rows = _whole_rows(
+            x_axis, tuple(int(start) for start in x_starts), self.abreast, self.kinked
+        )
+
+    @property
+    def n_columns(self) -> int:
+        """Columns of blocks."""
+        return len(self.x_starts)
+
+    def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[int, int]]]:
+        """Samples of one column of blocks that may be extrema.
+
+        Returns
+        -------
+        candidates : ndarray of int, shape (n, 4)
+            Slice, row, column; the fourth column is not used. Blocks overlap, and a sample may be
+            there twice.
+        undecided : list of (int, int)
+            First row and first column of blocks that had too many, of which none are returned.
+        """
+        space, blocks = self.space, self.x_blocks
+        _, lower, upper = space.blurs
+        nodes, expand = expansion(self.length)
+        group = range(column * _ABREAST, (column + 1) * _ABREAST)
+        n_blurs = blocks.first.shape[1]
+        source = space.source
+        strips = np.zeros((n_blurs, source.shape[0], _ABREAST * nodes.size))
+        for blur in range(n_blurs):
+            for k, block in enumerate(group):
+                width, start = blocks.width[block, blur], blocks.offset[block, blur]
+                rows = blocks.entries[start : start + nodes.size * width].reshape(-1, width)
+                left = blocks.first[block, blur]
+                part = strips[blur, :, k * nodes.size : (k + 1) * nodes.size]
+                np.matmul(source[:, left : left + width], rows.T, out=part)
+        whole = np.zeros((len(self.kinked), source.shape[0], self.abreast), dtype=np.float32)
+        for k in range(len(self.kinked)):
+            rows, left = self.x_rows.rows(column, k)
+            whole[k] = source[:, left : left + rows.shape[1]] @ rows.T
+        single = expand.astype(np.float32)
+        found = np.empty((256 * self.y_blocks.start.size, 4), dtype=np.int64)
+        counts = np.empty(self.y_blocks.start.size, dtype=np.int64)
+        # Sums of n products in single precision err by n units of the sum of their sizes.
+        rounding = 2 * (nodes.size + 3) * _UNIT * np.abs(expand).sum(axis=1).max() ** 2
+        _search(
+            strips,
+            self.y_blocks.first,
+            self.y_blocks.width,
+            self.y_blocks.offset,
+            self.y_blocks.entries,
+            self.y_blocks.start,
+            lower,
+            upper,
+            whole,
+            self.y_rows,
+            self.n_kinked,
+            np.searchsorted(self.kinked, lower[: self.n_kinked]),
+            np.searchsorted(self.kinked, upper[: self.n_kinked]),
+            single,
+            np.ascontiguousarray(single.T),
+            self.bounds[:, column],
+            rounding,
+            self.tolerance,
+            self.x_starts[column],
+            found,
+            counts,
+        )
+        parts = [found[256 * i : 256 * i + count] for i, count in enumerate(counts) if count <= 256]
+        undecided = [
+            (int(self.y_blocks.start[i]), int(self.x_starts[column]))
+            for i in np.flatnonzero(counts > 256)
+        ]
+        return np.concatenate([np.empty((0, 4), dtype=np.int64), *parts]), undecided
+
+
+@lru_cache(maxsize=4)
+def _abreast_blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisBlocks:
+    """Blocks of the x axis, `_ABREAST` of them beside each other from each start on."""
+    parts = [axis_blocks(_From(axis, start), _ABREAST * length, length, length) for start in starts]
+    offsets = np.cumsum([0, *(part.entries.size for part in parts)])
+    return AxisBlocks(
+        np.concatenate([part.start + start for part, start in zip(parts, starts, strict=True)]),
+        np.concatenate([part.first for part in parts]),
+        np.concatenate([part.width for part in parts]),
+        np.concatenate(
+            [part.offset + more for part, more in zip(parts, offsets[:-1], strict=True)]
+        ),
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("entries", "smooth", "rough", "norm", "residual")
+        ),
+    )
+
+
+class _From:
+    """An axis from one of its samples on."""
+
+    def __init__(self, axis: SplineAxis, start: int) -> None:
+        self.axis, self.start, self.rows = axis, start, axis.rows
+
+    def block(self, start: int, stop: int) -> Block:
+        """See `AxisOperator.block`."""
+        return self.axis.block(self.start + start, self.start + stop)
+
+
+@njit(cache=True, nogil=True)
+def _search(  # noqa: PLR0913
+    strips,
+    first,
+    width,
+    offset,
+    entries,
+    starts,
+    lower,
+    upper,
+    whole,
+    whole_rows,
+    n_kinked,
+    whole_lower,
+    whole_upper,
+    expand,
+    expand_t,
+    bounds,
+    rounding,
+    tolerance,
+    left,
+    found,
+    counts,
+):
+    """Search one column of blocks from top to bottom; 256 candidates have room per block."""
+    length, n_nodes = expand.shape
+    n_slices, n_blurs, across = lower.size, strips.shape[0], strips.shape[2]
+    abreast = across // n_nodes
+    gaussians = np.empty((n_blurs, n_nodes, across))
+    nodes = np.empty((n_nodes, across), dtype=np.float32)
+    half = np.empty((length, across), dtype=np.float32)
+    dog = np.empty((n_slices, length, abreast * length), dtype=np.float32)
+    error = np.empty(n_slices)
+    every = np.empty((whole.shape[0], length, abreast * length), dtype=np.float32)
+    whole_error = np.empty(whole.shape[0])
+    for i in range(starts.size):
+        for blur in range(n_blurs):
+            n = width[i, blur]
+            begin = offset[i, blur]
+            rows = entries[begin : begin + n_nodes * n].reshape(n_nodes, n)
+            top = first[i, blur]
+            np.dot(rows, strips[blur, top : top + n], gaussians[blur])
+        for k in range(whole.shape[0]):
+            n = whole_rows.width[i, k]
+            begin, top = whole_rows.offset[i, k], whole_rows.first[i, k]
+            rows = whole_rows.entries[begin : begin + length * n].reshape(length, n)
+            strip = whole[k, top : top + n]
+            np.dot(rows, strip, every[k])
+            # A sum of n products, of numbers that were rounded; absolute rows add up to below two.
+            whole_error[k] = 2 * (n + 4) * _UNIT * np.abs(strip).max()
+        for s in range(n_kinked):
+            error[s] = _UNIT * _difference(every[whole_upper[s]], every[whole_lower[s]], dog[s])
+            error[s] += whole_error[whole_upper[s]] + whole_error[whole_lower[s]]
+        for s in range(n_kinked, n_slices):
+            high, low = gaussians[upper[s]], gaussians[lower[s]]
+            error[s] = bounds[i, s] + rounding * _difference(high, low, nodes)
+            np.dot(expand, nodes, half)
+            np.dot(
+                half.reshape(length * abreast, n_nodes),
+                expand_t,
+                dog[s].reshape(length * abreast, length),
+            )
+        counts[i] = _scan(dog, error, tolerance, starts[i], left, found[256 * i : 256 * (i + 1)])
+
+
+@njit(cache=True, nogil=True)
+def _difference(high, low, out):
+    """Write ``high - low`` in single precision; return its largest absolute value."""
+    largest = 0.0
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            value = high[y, x] - low[y, x]
+            largest = max(largest, abs(value))
+            out[y, x] = value
+    return largest
+
+
+@njit(cache=True, nogil=True)
+def _scan(dog, error, tolerance, top, left, found):
+    """Write samples that may be extrema, given how far each slice may be off."""
+    n_slices, n_rows, n_columns = dog.shape
+    count = 0
+    slack = np.empty(3, dtype=np.float32)
+    for s in range(1, n_slices - 1):
+        for ds in range(3):
+            slack[ds] = (tolerance - error[s] - error[s - 1 + ds]) * (1 - 1e-6) - 1e-30
+        for y in range(1, n_rows - 1):
+            here, above, below = dog[s, y], dog[s, y - 1], dog[s, y + 1]
+            finer, coarser = dog[s - 1, y], dog[s + 1, y]
+            slack_f, slack_h, slack_c = slack
+            any_here = 0
+            for x in range(1, n_columns - 1):
+                low, high = here[x] - slack_h, here[x] + slack_h
+                maximum = (
+                    (here[x - 1] < low)
+                    & (here[x + 1] < low)
+                    & (above[x] < low)
+                    & (below[x] < low)
+                    & (finer[x] < here[x] - slack_f)
+                    & (coarser[x] < here[x] - slack_c)
+                )
+                minimum = (
+                    (here[x - 1] > high)
+                    & (here[x + 1] > high)
+                    & (above[x] > high)
+                    & (below[x] > high)
+                    & (finer[x] > here[x] + slack_f)
+                    & (coarser[x] > here[x] + slack_c)
+                )
+                any_here |= maximum | minimum
+            if any_here:
+                for x in range(1, n_columns - 1):
+                    if _may_be(dog, s, y, x, slack):
+                        if count < found.shape[0]:
+                            found[count, 0] = s
+                            found[count, 1] = top + y
+                            found[count, 2] = left + x
+                            found[count, 3] = 0
+                        count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _may_be(dog, s, y, x, slack):
+    """Whether a sample exceeds, or falls short of, all 26 neighbours by more than the slack."""
+    value = dog[s, y, x]
+    above, below = True, True
+    for ds in range(-1, 2):
+        low, high = value - slack[ds + 1], value + slack[ds + 1]
+        for dy in range(-1, 2):
+            for dx in range(-1, 2):
+                if ds == 0 and dy == 0 and dx == 0:
+                    continue
+                other = dog[s + ds, y + dy, x + dx]
+                above = above and other < low
+                below = below and other > high
+                if not (above or below):
+                    return False
+    return True

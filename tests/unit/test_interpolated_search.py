@@ -1,0 +1,118 @@
+"""The search from few samples finds what the search of all samples finds, and its bound holds."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import blobs
+
+from keystab import extrema, interpolated_search
+from keystab.dog_space import scale_space
+from keystab.interpolated_search import InterpolatedSearch, applies, error_bounds, expansion
+
+
+def both(image, n_spo, epsilon=0.0, camera_blur=1.1, **options):
+    """Extrema of the two searches."""
+    space = scale_space(image, camera_blur, n_spo, **options)
+    assert applies(space)
+    tolerance = max(epsilon, space.rounding)
+    with ThreadPoolExecutor(1) as pool:
+        dense = np.concatenate(extrema._evaluated(space, tolerance, pool, None))
+    dense = dense[np.lexsort((dense[:, 2], dense[:, 1], dense[:, 0]))]
+    return extrema.discrete_extrema(space, epsilon), dense
+
+
+def scene(kind: str) -> np.ndarray:
+    rng = np.random.default_rng(5)
+    image = blobs((31, 43), 1)
+    if kind == "noise":
+        return rng.random((31, 43))
+    if kind == "faint":
+        return 0.5 + 1e-9 * image
+    if kind == "edge":
+        return (np.add.outer(np.arange(31), 2 * np.arange(43)) > 55).astype(float)
+    if kind == "flat and strong":
+        image[:, 20:] = 0.3
+        image[12:, 30:] = 0.3 + 1e-4 * image[12:, :13]
+    return image
+
+
+@pytest.mark.parametrize("kind", ["blobs", "noise", "faint", "edge", "flat and strong"])
+@pytest.mark.parametrize("n_spo", [12, 15])
+def test_every_extremum_is_found(kind, n_spo):
+    found, dense = both(scene(kind), n_spo)
+    assert found.tolist() == dense.tolist()
+    assert len(dense) > (7 if kind == "blobs" else -1)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"epsilon": 1.19e-7},
+        {"epsilon": 1e-5},
+        {"kappa": 2**0.5},
+        {"kappa": 2 ** (1 / 30)},
+        {"camera_blur": 0.3},
+        {"octave": 1, "slices": (-1, 17)},
+        {"sigma_min": 1.4},
+        {"delta_min": 0.06},
+    ],
+    ids=str,
+)
+def test_whatever_the_sampling(options):
+    found, dense = both(blobs((58, 63), 2), 15, **options)
+    assert found.tolist() == dense.tolist()
+    assert len(dense) > 5
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 10**6), st.integers(26, 40), st.integers(26, 40))
+def test_whatever_the_picture(seed, height, width):
+    found, dense = both(blobs((height, width), seed), 14)
+    assert found.tolist() == dense.tolist()
+
+
+def test_a_constant_picture_has_none():
+    found, dense = both(np.full((30, 30), 0.7), 15)
+    assert len(found) == len(dense) == 0
+
+
+@pytest.mark.parametrize("kind", ["blobs", "noise", "edge"])
+@pytest.mark.parametrize("n_spo", [12, 19])
+def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
+    space = scale_space(scene(kind), 1.1, n_spo)
+    search = InterpolatedSearch(space, 0.0)
+    bounds = error_bounds(space, search.y_blocks, search.x_blocks)
+    dog = space.window()
+    nodes, expand = expansion(search.length)
+    reached = 0.0
+    for i, top in enumerate(search.y_blocks.start):
+        for j, left in enumerate(search.x_blocks.start):
+            box = dog[:, top : top + search.length, left : left + search.length]
+            interpolated = expand @ box[:, nodes][:, :, nodes] @ expand.T
+            off = np.abs(interpolated - box).max(axis=(1, 2))
+            bound = bounds[i, j // 4]
+            assert (off <= bound + 1e-14).all()
+            reached = max(reached, (off / bound)[:4].max())
+    assert reached > 1e-3
+
+
+def test_blocks_with_too_many_candidates_are_evaluated(monkeypatch):
+    monkeypatch.setattr(interpolated_search, "_KINKED", 0.0)  # slice 1 is then all candidates
+    image = blobs((31, 43), 3)
+    found, dense = both(image, 15)
+    search = InterpolatedSearch(scale_space(image, 1.1, 15), 1e-14)
+    assert any(search.candidates(column)[1] for column in range(search.n_columns))
+    assert found.tolist() == dense.tolist()
+
+
+def test_coarse_small_and_cosine_scale_spaces_are_not_interpolated():
+    image = blobs((40, 40), 4)
+    assert applies(scale_space(image, 1.1, 15))
+    assert not applies(scale_space(image, 1.1, 5))
+    assert not applies(scale_space(image[:9, :9], 1.1, 15))
+    assert not applies(scale_space(image, 1.1, 15, oversampling="cosine"))
