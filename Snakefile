@@ -30,7 +30,12 @@ include: "workflow/rules/figures.smk"  # tables -> figures
 #   fig4  extrema that come and go as the sampling gets finer   fig4_*.csv
 #   fig5  features against stability                            fig5_*.csv
 #   fig6  iso-surfaces around stable and unstable keypoints     fig6.csv, fig6_cubes.parquet
+#   fig7  limits of the refinement, under translations          fig7_*.csv
+#   fig8  stability and precision when the camera zooms out     fig8_*.csv
+#   fig9  keypoints against the ratio of the two blurs          fig9_*.csv
+#   figS1 stability and precision when the camera rotates       figS1_*.csv
 FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6"]
+FIGURES += ["fig7", "fig8", "fig9", "figS1"]
 
 
 rule all:

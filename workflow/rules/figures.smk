@@ -132,3 +132,82 @@ use rule fig1 as fig6 with:
         module="keystab.figures.fig6",
         code=fingerprint("keystab.figures.fig6"),
         software=SOFTWARE,
+
+
+use rule fig1 as fig7 with:
+    input:
+        f"{RESULTS}/tables/fig7_curves.csv",
+        f"{RESULTS}/tables/fig7_precision.csv",
+        f"{RESULTS}/tables/fig7_counts.csv",
+        f"{RESULTS}/tables/fig7_shipped.csv",
+    output:
+        pdf=f"{DRAWN}/fig7.pdf",
+        png=report(f"{DRAWN}/fig7.png", caption="../report/fig7.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig7.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig7.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig7",
+        code=fingerprint("keystab.figures.fig7"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig8 with:
+    input:
+        f"{RESULTS}/tables/fig8_curves.csv",
+        f"{RESULTS}/tables/fig8_precision.csv",
+    output:
+        pdf=f"{DRAWN}/fig8.pdf",
+        png=report(f"{DRAWN}/fig8.png", caption="../report/fig8.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig8.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig8.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig8",
+        code=fingerprint("keystab.figures.fig8"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig9 with:
+    input:
+        f"{RESULTS}/tables/fig9_counts.csv",
+        f"{RESULTS}/tables/fig9_keypoints.csv",
+        f"{RESULTS}/tables/fig9_occurrence.csv",
+    output:
+        pdf=f"{DRAWN}/fig9.pdf",
+        png=report(f"{DRAWN}/fig9.png", caption="../report/fig9.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig9.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig9.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig9",
+        code=fingerprint("keystab.figures.fig9"),
+        software=SOFTWARE,
+
+
+use rule fig1 as figS1 with:
+    input:
+        f"{RESULTS}/tables/figS1_curves.csv",
+        f"{RESULTS}/tables/figS1_precision.csv",
+    output:
+        pdf=f"{DRAWN}/figS1.pdf",
+        png=report(f"{DRAWN}/figS1.png", caption="../report/figS1.rst", category="Figures"),
+    log:
+        f"{LOGS}/figS1.log",
+    benchmark:
+        f"{LOGS}/benchmarks/figS1.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.figs1",
+        code=fingerprint("keystab.figures.figs1"),
+        software=SOFTWARE,
