@@ -95,12 +95,15 @@ def _draw_counts(ax: Axes, counts: DataFrame) -> None:
     """Draw the number of keypoints with each ratio."""
     style.letter(ax, "a", "number of keypoints")
     octaves = np.log2(counts["kappa"].to_numpy(dtype=np.float64))
-    right = octaves**2 >= octaves[0] * octaves[-1]  # the half where the names stand
+    place = np.log(octaves)  # on the logarithmic axis
     for column, (text, colour, up) in LINES.items():
         number = counts[column].to_numpy()
         ax.plot(octaves, number, "o-", color=colour, label=column, markersize=2.6)
-        beside = number[right].max() if up > 0 else number[right].min()
-        style.direct_label(ax, octaves[-1], beside, text, colour, up=up)
+        start = 0.65 if up > 0 else 0.4  # of the axis: where the name begins
+        beside = np.linspace(place[0] + start * np.ptp(place), place[-1])
+        heights = np.interp(beside, place, number)
+        height = heights.max() if up > 0 else heights.min()
+        style.direct_label(ax, octaves[-1], height, text, colour, up=up)
     ax.set_xscale("log")
     ax.set_ylim(0.0, 1.15 * counts["n_octave"].max())
     kappas = counts["kappa"].to_numpy()
