@@ -31,8 +31,20 @@ include: "workflow/rules/figures.smk"  # tables -> figures
 #   fig4  extrema that come and go as the sampling gets finer   fig4_*.csv
 #   fig5  features against stability                            fig5_*.csv
 #   fig6  iso-surfaces around stable and unstable keypoints     fig6.csv, fig6_cubes.parquet
+#   fig7  limits of the refinement, under translations          fig7_*.csv
+#   fig8  stability and precision when the camera zooms out     fig8_*.csv
+#   fig9  keypoints against the ratio of the two blurs          fig9_*.csv
+#   fig10 aliasing                                              fig10_*.csv
+#   fig11 a wrongly assumed camera blur                         fig11_*.csv
+#   fig12 noise                                                 fig12_*.csv, fig12_pixels.parquet
+#   figS1 stability and precision when the camera rotates       figS1_*.csv
+#   figS2 a wrong blur, by its sign                             figS2.csv
+#   figS3 the blur of a real camera                             figS3*.csv
+#   figS4 blobs, whose scale is known                           figS4.csv
 #   floor why extrema come and go at any density                floor_*.csv
-FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "floor"]
+FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6"]
+FIGURES += ["fig7", "fig8", "fig9", "fig10", "fig11", "fig12"]
+FIGURES += ["figS1", "figS2", "figS3", "figS4", "floor"]
 
 
 rule all:

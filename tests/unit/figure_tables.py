@@ -17,14 +17,14 @@ SAMPLINGS = tuple(range(3, 20))
 
 
 @cache
-def tables(n: int) -> dict[str, pd.DataFrame]:
+def tables(n: int | str) -> dict[str, pd.DataFrame]:
     """Return the tables of figure `n`; do not change them."""
-    makers = (fig1, fig2, fig3, fig4, fig5, fig6)
-    return fig6(per_group=2, half=5) if n == 6 else makers[n - 1]()
+    makers = {1: fig1, 2: fig2, 3: fig3, 4: fig4, 5: fig5, 7: fig7, 8: fig8, 9: fig9, "s1": figs1}
+    return fig6(per_group=2, half=5) if n == 6 else makers[n]()
 
 
 @cache
-def drawn(n: int) -> tuple[dict[str, pd.DataFrame], Figure]:
+def drawn(n: int | str) -> tuple[dict[str, pd.DataFrame], Figure]:
     """Return the tables of figure `n` and the figure, drawn once for all tests."""
     return tables(n), import_module(f"keystab.figures.fig{n}").draw(tables(n))
 
@@ -277,3 +277,107 @@ def fig6(per_group: int = 10, half: int = 12) -> dict[str, pd.DataFrame]:
             )
         )
     return {"fig6": pd.DataFrame(panels), "fig6_cubes": pd.concat(cubes, ignore_index=True)}
+
+
+VIEWS = 32
+OFFSETS, MODELS = (0.5, 0.6, 1.0, np.inf), (1.0, 2.0, np.inf)
+
+
+def _seen_curve(draw: np.random.Generator, n: int, always: float) -> tuple[pd.DataFrame, dict]:
+    """Invent in how many views each of `n` keypoints is seen; return the curve and its counts."""
+    often = draw.beta(0.3 + always, 0.4, n)
+    times = np.where(draw.random(n) < always, VIEWS, 1 + draw.binomial(VIEWS - 2, often))
+    number = (times >= np.arange(1, VIEWS + 1)[:, None]).sum(axis=1)
+    share = number / n
+    spread = 196 * np.sqrt(share * (1 - share) * 2 / n)
+    curve = pd.DataFrame(
+        {
+            "percentage_of_images": 100 * np.arange(1, VIEWS + 1) / VIEWS,
+            "n_unique": number,
+            "percentage_of_unique": 100 * share,
+            "low": np.maximum(100 * share - spread, 0),
+            "high": np.minimum(100 * share + 1.3 * spread, 100),
+        }
+    )
+    counts = {"n_views": VIEWS, "mean_detections": times.sum() / VIEWS, "n_unique": n}
+    counts |= {"gap": 0, "n_always": number[-1], "share_always": share[-1]}
+    return curve, counts
+
+
+def _views(figure: str, samplings: tuple[int, ...], seed: int, further: bool = False) -> dict:
+    """Invent curves, precision and counts of a set of views."""
+    draw = np.random.default_rng(seed)
+    curves, precision, counts = [], [], []
+    for n_spo in samplings:
+        fine = 1 - np.exp(-(n_spo - 2) / 4)
+        usual, others = (0.6, 2.0), [(m, n) for n in MODELS for m in OFFSETS]
+        choices = [usual, *others] if further and n_spo in (3, 15) else [usual]
+        for m, n_models in [(np.nan, np.nan), *dict.fromkeys(choices)]:
+            kind = "discrete" if np.isnan(m) else "refined"
+            tight = 0.0 if kind == "discrete" else (0.5 / m) ** 4 / n_models
+            labels = {"n_spo": n_spo, "detections": kind}
+            labels |= {"max_offset": m, "max_iterations": n_models}
+            always = (0.42 + 0.5 * fine) * (1 - 0.8 * tight) * (1.1 if kind == "discrete" else 1)
+            curve, numbers = _seen_curve(draw, int(560 - 90 * fine - 60 * tight), min(always, 0.95))
+            counts.append(labels | numbers)
+            if n_spo in (3, 15):
+                curves.append(curve.assign(**labels))
+            if kind == "discrete" or (m, n_models) == usual:
+                mean = 0.6 / n_spo if kind == "discrete" else 0.3 / n_spo**1.7
+                mean *= draw.uniform(0.9, 1.1)
+                for quantity, unit in (("location", 1.0), ("log2_sigma", 0.3)):
+                    flat = kind == "discrete" and quantity == "log2_sigma"
+                    row = {"quantity": quantity, "n_keypoints": numbers["n_unique"] - 60}
+                    row |= {"mean": unit * mean, "median": 1e-16 if flat else 0.4 * unit * mean}
+                    row |= {"low": 0.85 * unit * mean, "high": 1.2 * unit * mean}
+                    precision.append(labels | row)
+    return {
+        f"{figure}_curves": pd.concat(curves, ignore_index=True),
+        f"{figure}_precision": pd.DataFrame(precision),
+        f"{figure}_counts": pd.DataFrame(counts),
+    }
+
+
+def fig7() -> dict[str, pd.DataFrame]:
+    """Invent translations, with a curve for every M_offset and N_interp, and SIFT as shipped."""
+    draw = np.random.default_rng(8)
+    parts = {"unfiltered": _seen_curve(draw, 1150, 0.4), "filtered": _seen_curve(draw, 420, 0.55)}
+    return _views("fig7", SAMPLINGS, 9, further=True) | {
+        "fig7_shipped": pd.concat(
+            [curve.assign(shipped=name) for name, (curve, _) in parts.items()], ignore_index=True
+        )
+    }
+
+
+def fig8() -> dict[str, pd.DataFrame]:
+    """Invent zoom-outs."""
+    return _views("fig8", SAMPLINGS, 10)
+
+
+def figs1() -> dict[str, pd.DataFrame]:
+    """Invent rotations."""
+    return _views("figS1", SAMPLINGS[::2], 11)
+
+
+def fig9() -> dict[str, pd.DataFrame]:
+    """Invent keypoints that small or large ratios miss, and some that come and go."""
+    draw = np.random.default_rng(12)
+    kappas = 2 ** (1 / np.arange(30, 1, -1))
+    n = 520
+    place = draw.uniform(size=(n, 1))
+    at = np.linspace(0, 1, len(kappas))
+    seen = np.where(place < 0.5, True, np.where(place < 0.75, at > 4 * place - 2.2, at < place))
+    seen &= draw.random((n, len(kappas))) > 0.1 * (place > 0.6)
+    seen[np.arange(n), draw.integers(0, len(kappas), n)] = True
+    keypoints = pd.DataFrame({"keypoint": np.arange(n), "stability": seen.mean(axis=1)})
+    keypoints["n_kappas"] = seen.sum(axis=1)
+    common = seen.sum(axis=0)
+    counts = pd.DataFrame({"kappa": kappas, "n_octave": common + 150, "n_common": common})
+    occurrence = pd.DataFrame(
+        {
+            "keypoint": np.repeat(np.arange(n), len(kappas)),
+            "kappa": np.tile(kappas, n),
+            "detected": seen.astype(int).ravel(),
+        }
+    )
+    return {"fig9_counts": counts, "fig9_keypoints": keypoints, "fig9_occurrence": occurrence}

@@ -9,7 +9,8 @@ from matplotlib.colors import to_rgb
 from numpy.testing import assert_allclose, assert_array_equal
 
 from keystab.errors import InputError
-from keystab.figures import fig1, fig2, fig3, fig4, fig5, fig6, palette
+from keystab.figures import fig1, fig2, fig3, fig4, fig5, fig6, fig7, fig8, fig9, palette
+from keystab.figures._stability_panels import spread
 
 
 def panel(figure, name):
@@ -261,3 +262,190 @@ def test_figure_6_names_what_is_wrong_with_a_cube():
     centre = cubes.query("panel == 0 and k_s == 0 and k_y == 0 and k_x == 0")["value"].item()
     with pytest.raises(InputError, match="is the value of the keypoint"):
         fig6.draw(tables | {"fig6": panels.assign(level=centre)})
+
+
+def end_texts(ax):
+    """Return the texts to the right of a panel, as drawn, with their heights in points."""
+    labels = [text for text in ax.texts if getattr(text, "xyann", (0,))[0] >= 10]
+    return [(text.get_text(), text) for text in labels]
+
+
+def test_figure_7_draws_a_curve_for_every_choice():
+    tables, figure = drawn(7)
+    curves = tables["fig7_curves"]
+    for n_spo, name in ((3, "a"), (15, "b")):
+        for n_models, row in ((1.0, name), (2.0, f"{name} 2"), (np.inf, f"{name} ∞")):
+            ax = panel(figure, row)
+            here = curves[curves["n_spo"] == n_spo]
+            expected = {"discrete": here[here["detections"] == "discrete"]}
+            for max_offset in figure_tables.OFFSETS:
+                mine = (here["max_offset"] == max_offset) & (here["max_iterations"] == n_models)
+                expected[fig7.limit(max_offset)] = here[mine]
+            columns = ["percentage_of_images", "percentage_of_unique"]
+            for label, rows in expected.items():
+                assert len(rows) == figure_tables.VIEWS
+                assert_array_equal(line(ax, label), rows[columns].T)
+            assert len(ax.get_lines()) == len(ax.collections) == 5  # a band each
+            written = [text for text, _ in end_texts(ax)]
+            for rows in expected.values():
+                assert f"{rows['n_unique'].iloc[-1]} of {rows['n_unique'].iloc[0]}" in written
+
+
+def test_figure_7_counts_what_is_seen_in_all_views():
+    tables, figure = drawn(7)
+    ax = panel(figure, "e")
+    counts = tables["fig7_counts"].query("n_spo in (3, 15)")
+    refined = counts[counts["detections"] == "refined"]
+    assert len(refined) == 24
+    places = set()
+    for row in refined.to_dict("records"):
+        limits = [fig7.limit(row[name]) for name in ("max_offset", "max_iterations")]
+        (x,), (number,) = line(ax, " ".join([str(row["n_spo"]), *limits]))
+        places.add(x)
+        assert number == row["n_always"]
+        (dot,) = [
+            one
+            for one in ax.get_lines()
+            if one.get_label() == " ".join([str(row["n_spo"]), *limits])
+        ]
+        assert dot.get_color() == palette.offset_colour(row["max_offset"])
+    assert len(places) == 24
+    for n_spo, always in counts.query("detections == 'discrete'")[["n_spo", "n_always"]].to_numpy():
+        assert_array_equal(line(ax, f"{n_spo} discrete")[1], [always, always])
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "2", "∞"] * 2
+
+
+def test_figure_7_shows_sift_as_shipped_beside_the_usual_refinement():
+    tables, figure = drawn(7)
+    ax = panel(figure, "f")
+    for name in ("unfiltered", "filtered"):
+        rows = tables["fig7_shipped"].query("shipped == @name")
+        assert_array_equal(line(ax, name)[1], rows["percentage_of_unique"])
+    usual = tables["fig7_curves"].query("n_spo == 3 and max_offset == 0.6 and max_iterations == 2")
+    assert_array_equal(line(ax, "as in (a)")[1], usual["percentage_of_unique"])
+
+
+def test_figure_7_names_curves_that_are_missing():
+    tables = figure_tables.tables(7)
+    curves, shipped = tables["fig7_curves"], tables["fig7_shipped"]
+    for wrong, message in (
+        ({"fig7_curves": curves.query("n_spo == 3")}, "refined extrema of 1 samplings"),
+        (
+            {"fig7_curves": curves.query("n_spo == 3 or detections != 'discrete'")},
+            "no discrete extrema of 15 scales",
+        ),
+        ({"fig7_shipped": shipped.query("shipped == 'filtered'")}, "no rows of unfiltered"),
+    ):
+        with pytest.raises(InputError, match=message):
+            fig7.draw(tables | wrong)
+
+
+@pytest.mark.parametrize(
+    ("n", "stem", "panels"), [(7, "fig7", "cd"), (8, "fig8", "bc"), ("s1", "figS1", "bc")]
+)
+def test_precision_is_drawn_on_logarithmic_axes(n, stem, panels):
+    tables, figure = drawn(n)
+    for name, quantity in zip(panels, ("location", "log2_sigma"), strict=True):
+        ax = panel(figure, name)
+        assert ax.get_yscale() == "log"
+        table = tables[f"{stem}_precision"].query("quantity == @quantity")
+        for detections in ("discrete", "refined"):
+            rows = table.query("detections == @detections")
+            assert_array_equal(line(ax, detections), rows[["n_spo", "mean"]].T)
+            if quantity == "location":
+                assert_array_equal(line(ax, f"{detections}, median")[1], rows["median"])
+        low, high = ax.get_ylim()
+        assert low < table["low"].min() and table["high"].max() < high
+        assert low > 0.1 * table["low"].min()  # not down to the medians of grid scales, which are 0
+
+
+@pytest.mark.parametrize(("n", "stem"), [(8, "fig8"), ("s1", "figS1")])
+def test_figures_8_and_s1_draw_four_curves_and_their_counts(n, stem):
+    tables, figure = drawn(n)
+    ax = panel(figure, "a")
+    curves = tables[f"{stem}_curves"]
+    written = [text for text, _ in end_texts(ax)]
+    styles = {}
+    for n_spo in (3, 15):
+        for detections in ("discrete", "refined"):
+            rows = curves.query("n_spo == @n_spo and detections == @detections")
+            name = f"{n_spo}, {detections}"
+            assert_array_equal(line(ax, name)[1], rows["percentage_of_unique"])
+            assert f"{rows['n_unique'].iloc[-1]} of {rows['n_unique'].iloc[0]}" in written
+            (drawn_line,) = [one for one in ax.get_lines() if one.get_label() == name]
+            assert drawn_line.get_color() == palette.DETECTION_COLOURS[detections]
+            styles.setdefault(n_spo, set()).add(drawn_line.get_linestyle())
+    assert styles == {3: {"--"}, 15: {"-"}}
+
+
+def test_precision_of_nothing_is_refused():
+    tables = figure_tables.tables(8)
+    none = tables["fig8_precision"].assign(mean=np.nan, median=np.nan, low=np.nan, high=np.nan)
+    with pytest.raises(InputError, match="there is no location above 0 to draw"):
+        fig8.draw(tables | {"fig8_precision": none})
+
+
+@pytest.mark.parametrize(
+    ("n", "names"), [(7, ["a", "a 2", "a ∞", "b", "b 2", "b ∞", "f"]), (8, ["a"])]
+)
+def test_names_at_the_ends_of_curves_do_not_overlap(n, names):
+    _, figure = drawn(n)
+    figure.draw_without_rendering()
+    for name in names:
+        boxes = [
+            type(text).__mro__[1].get_window_extent(text)  # of the text, without its leader
+            for label, text in end_texts(panel(figure, name))
+            if label
+        ]
+        assert len(boxes) >= 6
+        for i, one in enumerate(boxes):
+            assert not any(
+                one.shrunk(1.0, 0.7).overlaps(other.shrunk(1.0, 0.7)) for other in boxes[:i]
+            )
+            assert one.x1 <= figure.bbox.x1
+
+
+def test_heights_are_spread_no_farther_than_needed():
+    draw = np.random.default_rng(1)
+    for _ in range(50):
+        heights = np.sort(draw.uniform(0, 30, 6))
+        apart = np.array(spread(heights, 4.0))
+        assert (np.diff(apart) > 4 - 1e-9).all()
+        assert apart.mean() == pytest.approx(heights.mean())
+        assert np.array(spread(heights, 4.0, 25.0)).max() <= 25
+    assert spread([0.0, 10.0, 20.0], 4.0) == [0.0, 10.0, 20.0]
+
+
+def test_figure_9_draws_counts_and_the_matrix_in_order_of_stability():
+    tables, figure = drawn(9)
+    counts = tables["fig9_counts"]
+    for column in ("n_octave", "n_common"):
+        octaves, number = line(panel(figure, "a"), column)
+        assert_allclose(octaves, np.log2(counts["kappa"]))
+        assert_array_equal(number, counts[column])
+    ticks = [tick.get_text() for tick in panel(figure, "a").get_xticklabels()]
+    assert ticks[0] == "$2^{1/30}$\n1.02" and ticks[-1] == "$2^{1/2}$\n1.41"
+    shown = panel(figure, "b").images[0].get_array()
+    stability = shown.max(axis=0)
+    assert (np.diff(stability) >= 0).all()
+    assert_array_equal(np.sort(tables["fig9_keypoints"]["stability"]), stability)
+    detected = tables["fig9_occurrence"].pivot(index="kappa", columns="keypoint", values="detected")
+    assert_array_equal((~np.ma.getmaskarray(shown)).sum(axis=1), detected.sum(axis=1))
+
+
+def test_figure_9_says_which_shares_are_found_with_most_and_with_all_ratios():
+    tables, figure = drawn(9)
+    stability = tables["fig9_keypoints"]["stability"]
+    (text,) = (text.get_text() for text in panel(figure, "b").texts)
+    most, always = 100 * (stability > 0.8).mean(), 100 * (stability == 1).mean()
+    assert text == f"with more than 80 % of the ratios: {most:.0f} %, with all: {always:.0f} %"
+    ends, _ = line(panel(figure, "b"), "stable")
+    assert ends[1] - ends[0] == (stability > 0.8).sum()
+
+
+def test_figure_9_refuses_an_occurrence_matrix_with_holes():
+    tables = figure_tables.tables(9)
+    with pytest.raises(
+        InputError, match="fig9_occurrence.csv: lacks some pairs .* a value of kappa"
+    ):
+        fig9.draw(tables | {"fig9_occurrence": tables["fig9_occurrence"].iloc[1:]})

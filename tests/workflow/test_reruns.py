@@ -8,12 +8,17 @@ import time
 import pytest
 from project import QUICK
 
-FIGURES = {f"fig{n}" for n in range(1, 7)}
+FIGURES = {f"fig{n}" for n in (*range(1, 10), "S1")}
 AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
-MATCHING = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
-DETECTION = {"detect", "detect_stored", "detect_grid", "count_refined"} | MATCHING
-STILL = {"simulate", "scale_space"} | DETECTION
-EVERYTHING = STILL | FIGURES | {"semigroup", "describe_views"}
+SAMPLINGS = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
+VIEWS = {"match_views", "match_shipped", "fig7", "fig8", "figS1"}
+KAPPAS = {"match_kappas", "fig9"}
+MATCHING = SAMPLINGS | VIEWS | KAPPAS
+ONE_VIEW = {"detect", "detect_stored", "detect_grid", "count_refined"} | SAMPLINGS
+DETECTION = ONE_VIEW | {"detect_views", "detect_kappas"} | MATCHING
+STILL = {"simulate", "scale_space", "detect_kappas"} | ONE_VIEW | KAPPAS
+SIMULATION = STILL | DETECTION
+EVERYTHING = SIMULATION | FIGURES | {"semigroup", "describe_views"}
 
 
 def reruns(project) -> set[str]:
@@ -36,7 +41,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
         ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
-        ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"simulate", "describe_views", "fig2", "cut_cubes"} | STILL),
+        ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"simulate", "describe_views", "fig2", "cut_cubes"} | SIMULATION),
         ("workflow/report/fig3.rst", "", "A better caption. ", set()),
         ("environment.lock", "numpy==", "# another numpy\nnumpy==", EVERYTHING),
     ],
@@ -54,14 +59,19 @@ def test_edits_of_code(finished, name, old, new, expected):
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("refinement: {max_offset: 0.7}", {"count_refined"}),
-        ("refinement: {move: unit_step}", {"detect", "detect_stored", "count_refined"} | MATCHING),
+        ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | KAPPAS),
+        ("refinement: {move: unit_step}", DETECTION - {"detect_grid"}),
         ("comparison: {match_sign: true}", MATCHING),
-        ("comparison: {last_scale: 2.0}", MATCHING | {"count_refined"}),
+        ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS),
         ("comparison: {scale_ratio: 1.5}", MATCHING),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
+        ("stability: {n_resamples: 200}", VIEWS),
+        ("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7"}),
+        ("shipped: {contrast: 0.02}", {"match_shipped", "fig7"}),
+        ("kappas: {fractions: [2, 5]}", {"detect_kappas"} | KAPPAS),
+        ("sets: {zooms: {zoom: 1.4}}", {"simulate", "detect_views", "match_views", "fig8"}),
         ("draft: false", FIGURES),
         # 1.1 is also the blur and 0.0 also the shift: the set of values stays the same.
         ("sets: {still: {noise: 1.1, step: 20}}", STILL),

@@ -134,6 +134,199 @@ use rule fig1 as fig6 with:
         software=SOFTWARE,
 
 
+use rule fig1 as fig7 with:
+    input:
+        f"{RESULTS}/tables/fig7_curves.csv",
+        f"{RESULTS}/tables/fig7_precision.csv",
+        f"{RESULTS}/tables/fig7_counts.csv",
+        f"{RESULTS}/tables/fig7_shipped.csv",
+    output:
+        pdf=f"{DRAWN}/fig7.pdf",
+        png=report(f"{DRAWN}/fig7.png", caption="../report/fig7.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig7.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig7.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig7",
+        code=fingerprint("keystab.figures.fig7"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig8 with:
+    input:
+        f"{RESULTS}/tables/fig8_curves.csv",
+        f"{RESULTS}/tables/fig8_precision.csv",
+    output:
+        pdf=f"{DRAWN}/fig8.pdf",
+        png=report(f"{DRAWN}/fig8.png", caption="../report/fig8.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig8.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig8.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig8",
+        code=fingerprint("keystab.figures.fig8"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig9 with:
+    input:
+        f"{RESULTS}/tables/fig9_counts.csv",
+        f"{RESULTS}/tables/fig9_keypoints.csv",
+        f"{RESULTS}/tables/fig9_occurrence.csv",
+    output:
+        pdf=f"{DRAWN}/fig9.pdf",
+        png=report(f"{DRAWN}/fig9.png", caption="../report/fig9.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig9.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig9.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig9",
+        code=fingerprint("keystab.figures.fig9"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig10 with:
+    input:
+        f"{RESULTS}/tables/fig10_counts.csv",
+        f"{RESULTS}/tables/fig10_curves.csv",
+    output:
+        pdf=f"{DRAWN}/fig10.pdf",
+        png=report(f"{DRAWN}/fig10.png", caption="../report/fig10.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig10.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig10.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig10",
+        code=fingerprint("keystab.figures.fig10"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig11 with:
+    input:
+        f"{RESULTS}/tables/fig11_curves.csv",
+        f"{RESULTS}/tables/fig11_scales.csv",
+    output:
+        pdf=f"{DRAWN}/fig11.pdf",
+        png=report(f"{DRAWN}/fig11.png", caption="../report/fig11.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig11.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig11.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig11",
+        code=fingerprint("keystab.figures.fig11"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig12 with:
+    input:
+        f"{RESULTS}/tables/fig12_curves.csv",
+        f"{RESULTS}/tables/fig12_pixels.parquet",
+        f"{RESULTS}/tables/fig12_scales.csv",
+        f"{RESULTS}/tables/fig12_theory.csv",
+    output:
+        pdf=f"{DRAWN}/fig12.pdf",
+        png=report(f"{DRAWN}/fig12.png", caption="../report/fig12.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig12.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig12.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig12",
+        code=fingerprint("keystab.figures.fig12"),
+        software=SOFTWARE,
+
+
+use rule fig1 as figS1 with:
+    input:
+        f"{RESULTS}/tables/figS1_curves.csv",
+        f"{RESULTS}/tables/figS1_precision.csv",
+    output:
+        pdf=f"{DRAWN}/figS1.pdf",
+        png=report(f"{DRAWN}/figS1.png", caption="../report/figS1.rst", category="Figures"),
+    log:
+        f"{LOGS}/figS1.log",
+    benchmark:
+        f"{LOGS}/benchmarks/figS1.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.figs1",
+        code=fingerprint("keystab.figures.figs1"),
+        software=SOFTWARE,
+
+
+use rule fig1 as figS2 with:
+    input:
+        f"{RESULTS}/tables/figS2.csv",
+    output:
+        pdf=f"{DRAWN}/figS2.pdf",
+        png=report(f"{DRAWN}/figS2.png", caption="../report/figS2.rst", category="Figures"),
+    log:
+        f"{LOGS}/figS2.log",
+    benchmark:
+        f"{LOGS}/benchmarks/figS2.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.figs2",
+        code=fingerprint("keystab.figures.figs2"),
+        software=SOFTWARE,
+
+
+use rule fig1 as figS3 with:
+    input:
+        f"{RESULTS}/tables/figS3.csv",
+        f"{RESULTS}/tables/figS3_profiles.csv",
+    output:
+        pdf=f"{DRAWN}/figS3.pdf",
+        png=report(f"{DRAWN}/figS3.png", caption="../report/figS3.rst", category="Figures"),
+    log:
+        f"{LOGS}/figS3.log",
+    benchmark:
+        f"{LOGS}/benchmarks/figS3.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.figS3",
+        code=fingerprint("keystab.figures.figS3"),
+        software=SOFTWARE,
+
+
+use rule fig1 as figS4 with:
+    input:
+        f"{RESULTS}/tables/figS4.csv",
+    output:
+        pdf=f"{DRAWN}/figS4.pdf",
+        png=report(f"{DRAWN}/figS4.png", caption="../report/figS4.rst", category="Figures"),
+    log:
+        f"{LOGS}/figS4.log",
+    benchmark:
+        f"{LOGS}/benchmarks/figS4.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.figS4",
+        code=fingerprint("keystab.figures.figS4"),
+        software=SOFTWARE,
+
+
 use rule fig1 as floor with:
     input:
         f"{RESULTS}/tables/floor_rates.csv",

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keystab.errors import InputError
 from keystab.figures import palette, style
+from keystab.figures._occurrence import Share, draw_matrix, mark_groups, occurrence
 from keystab.figures._render import Tables, check_tables, main
 
 if TYPE_CHECKING:
@@ -36,35 +37,6 @@ TABLES = {
 
 FLOOR = 10.0
 """Per cent: the level at which the paper sees the rates settle; drawn as a guide."""
-
-
-class Occurrence(NamedTuple):
-    """Which unique keypoint is detected at which sampling.
-
-    ``detected[i, j]`` says whether keypoint j is seen at ``n_spo[i]``; ``stability[j]`` is the
-    share of samplings that see it; ``order`` lists the keypoints from least to most stable.
-    """
-
-    n_spo: NDArray[np.int64]
-    detected: NDArray[np.bool_]
-    stability: NDArray[np.float64]
-    order: NDArray[np.int64]
-
-
-class Share(NamedTuple):
-    """A share of the unique keypoints, between 0 and 1, and what is counted."""
-
-    value: float
-    note: str
-
-    @property
-    def percent(self) -> str:
-        """The share in per cent, as written on the figure."""
-        return f"{100 * self.value:.0f} %"
-
-    def __str__(self) -> str:
-        """Return what is counted and the share, as written on the figure."""
-        return f"{self.note}: {self.percent}"
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
@@ -95,7 +67,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     """
     check_tables(tables, TABLES)
     counts = tables["fig4_counts"].sort_values("n_spo")
-    occurrence = _occurrence(tables["fig4_occurrence"], tables["fig4_keypoints"])
+    seen = occurrence(tables["fig4_occurrence"], tables["fig4_keypoints"], "n_spo", "fig4")
     shares = _shares(tables["fig4_summary"])
     with style.context():
         from matplotlib.colors import ListedColormap
@@ -108,33 +80,22 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         lower = outer[1].subgridspec(2, 2, width_ratios=(1.0, 0.012), wspace=0.01)
         matrix, ordered = figure.add_subplot(lower[0, 0]), figure.add_subplot(lower[1, 0])
         style.letter(matrix, "c", "occurrence of each unique keypoint at each sampling")
-        seen = np.where(occurrence.detected, 1.0, np.nan)
-        _draw_matrix(matrix, occurrence.n_spo, seen, ListedColormap([palette.INK]))
+        black = np.where(seen.detected, 1.0, np.nan)
+        draw_matrix(matrix, black, ListedColormap([palette.INK]))
         matrix.set_xlabel("unique keypoints")
         style.letter(ordered, "d", "the same, ordered and coloured by stability")
-        stability = np.where(occurrence.detected, occurrence.stability, np.nan)
-        shown = stability[:, occurrence.order]
-        image = _draw_matrix(ordered, occurrence.n_spo, shown, palette.stability_map())
-        _mark_groups(ordered, len(occurrence.stability), shares)
+        image = draw_matrix(ordered, seen.coloured(), palette.stability_map())
+        for ax in (matrix, ordered):
+            _label_rows(ax, seen.sets)
+        stable = f"{shares['stable']}, at all of them: {shares['always'].percent}"
+        groups = {
+            "unstable": (shares["unstable"], str(shares["unstable"])),
+            "stable": (shares["stable"], stable),
+        }
+        mark_groups(ordered, len(seen.stability), groups)
         bar = figure.colorbar(image, cax=figure.add_subplot(lower[1, 1]), label="stability")
         bar.outline.set_visible(False)
         return style.settle(figure, draft)
-
-
-def _occurrence(detections: DataFrame, keypoints: DataFrame) -> Occurrence:
-    """Turn the tidy tables into a matrix, and order its columns."""
-    matrix = detections.pivot_table(index="n_spo", columns="keypoint", values="detected")
-    matrix = matrix.reindex(columns=keypoints["keypoint"])
-    if matrix.isna().any(axis=None):
-        raise InputError(
-            "fig4_occurrence.csv: lacks some pairs of a keypoint of fig4_keypoints.csv and a "
-            "sampling; remake both tables"
-        )
-    detected = matrix.to_numpy() > 0
-    n_spo = matrix.index.to_numpy(dtype=np.int64)
-    stability = keypoints["stability"].to_numpy(dtype=np.float64)
-    mean_n_spo = (n_spo[:, None] * detected).sum(axis=0) / np.maximum(detected.sum(axis=0), 1)
-    return Occurrence(n_spo, detected, stability, np.lexsort((mean_n_spo, stability)))
 
 
 def _shares(summary: DataFrame) -> dict[str, Share]:
@@ -192,37 +153,11 @@ def _draw_rates(ax: Axes, counts: DataFrame) -> None:
     style.finish_axes(ax)
 
 
-def _draw_matrix(
-    ax: Axes, n_spo: NDArray[np.int64], values: NDArray[np.float64], colours: Any
-) -> Any:
-    """Draw an occurrence matrix, the coarsest sampling on top; NaN is left white."""
-    image = ax.imshow(
-        values, cmap=colours, vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest"
-    )
+def _label_rows(ax: Axes, n_spo: NDArray[np.int64]) -> None:
+    """Name some rows of an occurrence matrix by their sampling."""
     rows = np.arange(0, len(n_spo), -(-len(n_spo) // 5))
     ax.set_yticks(rows, [str(n) for n in n_spo[rows]])
     ax.set_ylabel(style.N_SPO)
-    ax.tick_params(length=2)
-    return image
-
-
-def _mark_groups(ax: Axes, n: int, shares: dict[str, Share]) -> None:
-    """Underline the unstable and the stable ones of `n` columns, and say which share they are."""
-    unstable, stable, always = (shares[name] for name in ("unstable", "stable", "always"))
-    low, high = round(n * unstable.value), round(n * stable.value)
-    ax.set_xticks([])
-    below = ax.get_xaxis_transform()
-    for group, start, stop, side, text in (
-        ("unstable", 0, low, "left", str(unstable)),
-        ("stable", n - high, n, "right", f"{stable}, at all of them: {always.percent}"),
-    ):
-        colour = palette.LABEL_COLOURS[group]
-        span = (start - 0.5, stop - 0.5)
-        line: dict[str, Any] = {"linewidth": 2.5, "solid_capstyle": "butt", "clip_on": False}
-        ax.plot(span, (-0.05, -0.05), transform=below, color=colour, label=group, **line)
-        place: dict[str, Any] = {"ha": side, "va": "top", "fontsize": style.SMALL}
-        edge = span[0] if side == "left" else span[1]
-        ax.text(edge, -0.1, text, transform=below, color=colour, **place)
 
 
 if __name__ == "__main__":

@@ -36,6 +36,12 @@ OTHERS_COLOUR = "#ececec"
 DETECTION_COLOURS = {"discrete": "#D55E00", "refined": "#0072B2"}
 """Extrema on the grid, and after refinement by the quadratic model."""
 
+_OFFSETS = ("#04121f", "#00437a", "#0072B2", "#5AAEE0")
+"""From no limit on the offset to the tightest; the third is that of "refined"."""
+
+SHIPPED_COLOURS = {"unfiltered": "#A8458A", "filtered": "#5b1f57"}
+"""SIFT as shipped, without and with its filters of contrast and edges (figure 7)."""
+
 METHOD_COLOURS = {"sampled": "#D55E00", "dct": "#0072B2", "discrete_analogue": "#009E73"}
 """Ways to blur (figure 1)."""
 
@@ -84,6 +90,28 @@ def n_spo_colour(n_spo: int, lowest: int = 3, highest: int = 19) -> tuple[float,
 
     share = min(max((n_spo - lowest) / (highest - lowest), 0.0), 1.0)
     red, green, blue = seaborn.color_palette("mako_r", as_cmap=True)(0.2 + 0.7 * share)[:3]
+    return red, green, blue
+
+
+def offset_colour(max_offset: float) -> tuple[float, float, float]:
+    """Return the colour of refined keypoints by ``M_offset``: light for a tight limit, dark for none.
+
+    Parameters
+    ----------
+    max_offset : float
+        Largest offset accepted, in samples; > 0, or infinite. 0.6 has the colour of "refined".
+
+    Examples
+    --------
+    >>> from matplotlib.colors import to_rgb
+    >>> offset_colour(0.6) == to_rgb(DETECTION_COLOURS["refined"])
+    True
+    """
+    from matplotlib.colors import to_rgb
+
+    stops = (0.0, 0.5 / 1.0, 0.5 / 0.6, 1.0)  # of 0.5 / max_offset
+    channels = zip(*map(to_rgb, _OFFSETS), strict=True)
+    red, green, blue = (float(np.interp(0.5 / max_offset, stops, one)) for one in channels)
     return red, green, blue
 
 

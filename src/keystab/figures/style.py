@@ -232,13 +232,25 @@ def log_x_axis(ax: Axes, low: float, high: float) -> None:
         Range of the data, > 0: powers of ten are labelled where it holds two or more, otherwise
         numbers such as 0.2 and 0.5 as well.
     """
+    ax.set_xscale("log")
+    _label_log_axis(ax.xaxis, low, high)
+
+
+def log_y_axis(ax: Axes, low: float, high: float) -> None:
+    """Do what `log_x_axis` does for the vertical axis, and make it as long as the range."""
+    ax.set_yscale("log")
+    _label_log_axis(ax.yaxis, low, high)
+    ax.set_ylim(low, high)
+
+
+def _label_log_axis(axis: Any, low: float, high: float) -> None:
+    """Label powers of ten, or more numbers where there are less than two."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    ax.set_xscale("log")
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_minor_formatter(NullFormatter())
     if np.floor(np.log10(high)) - np.ceil(np.log10(low)) < 1:
-        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def sampling_axis(ax: Axes, samplings: Iterable[int]) -> None:
