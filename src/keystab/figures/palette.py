@@ -7,7 +7,7 @@ perceptually uniform and nearly the same for every reader.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,6 +50,12 @@ FEATURE_COLOURS = {
 CHANGE_COLOURS = {"new": "#009E73", "lost": "#D55E00"}
 """Detections that a change of the sampling adds and removes (figure 4)."""
 
+COMPARED_COLOURS = {"found": CHANGE_COLOURS["lost"], "right": CHANGE_COLOURS["new"]}
+"""Shares of keypoints that are not lost, and that are not new (figure S2)."""
+
+THEORY_COLOURS = {"blob": "#0072B2", "dilation": "#A8458A"}
+"""What closed forms predict (figures 12 and S2)."""
+
 BALANCED_COLOUR = INK
 """The balanced sampling curve."""
 
@@ -77,6 +83,29 @@ def n_spo_colour(n_spo: int, lowest: int = 3, highest: int = 19) -> tuple[float,
     share = min(max((n_spo - lowest) / (highest - lowest), 0.0), 1.0)
     red, green, blue = seaborn.color_palette("mako_r", as_cmap=True)(0.2 + 0.7 * share)[:3]
     return red, green, blue
+
+
+def sweep_colours(values: Iterable[float]) -> dict[float, tuple[float, float, float]]:
+    """Return a colour for each value of a sweep: dark blue for the lowest, orange for the highest.
+
+    Parameters
+    ----------
+    values : iterable of float
+        Values of the sweep, in any order and repeated at will; their ranks decide.
+
+    Examples
+    --------
+    >>> list(sweep_colours([0.8, 0.25, 0.8]))
+    [0.25, 0.8]
+    """
+    import matplotlib
+
+    steps = sorted({float(value) for value in values})
+    shades = matplotlib.colormaps["plasma"](np.linspace(0.0, 0.74, len(steps)))
+    return {
+        value: (float(red), float(green), float(blue))
+        for value, (red, green, blue, _) in zip(steps, shades, strict=True)
+    }
 
 
 def stability_map() -> Colormap:
