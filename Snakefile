@@ -30,7 +30,11 @@ include: "workflow/rules/figures.smk"  # tables -> figures
 #   fig4  extrema that come and go as the sampling gets finer   fig4_*.csv
 #   fig5  features against stability                            fig5_*.csv
 #   fig6  iso-surfaces around stable and unstable keypoints     fig6.csv, fig6_cubes.parquet
-FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6"]
+#   fig10 aliasing against stability                            fig10_counts.csv, fig10_curves.csv
+#   fig11 a blur that is not known well against stability       fig11_curves.csv, fig11_scales.csv
+#   fig12 noise against stability                               fig12_*.csv, fig12_pixels.parquet
+#   figS2 what a blur assumed too large or too small does       figS2.csv
+FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "fig10", "fig11", "fig12", "figS2"]
 
 
 rule all:

@@ -8,7 +8,8 @@ with c < c' at smaller ones: a blob is detected at
 
 instead of :math:`\sigma` (see `keystab.blobs`). A mere dilation of the scale axis, in which each
 Gaussian of the scale-space is only misnamed, would move keypoints the other way, to
-:math:`\sqrt{\sigma^2 + c'^2 - c^2}`; but the ratio of the two Gaussians of a difference changes too.
+:math:`\sqrt{\sigma^2 + c'^2 - c^2}`; but the ratio of the two Gaussians of a difference changes as
+well.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ def blur_error_table(
     Parameters
     ----------
     keypoints : DataFrame
-        ``view, y, x, sigma`` of the refined keypoints of all views, in one frame, of all scales that
-        were searched: where they end at a range's lower end, what moves below it counts as lost.
-        View 0 has the assumed blur.
+        ``view, y, x, sigma`` of the refined keypoints of all views, in one frame. View 0 has the
+        assumed blur. All scales that were searched: if they were cut at the lower end of a range,
+        what moves below it would count as lost.
     blurs : sequence of float
         True blur c of every view, in pixels.
     assumed : float
@@ -59,7 +60,7 @@ def blur_error_table(
         its 95 % Wilson interval ``low_found, high_found``; of the view's keypoints in the range
         ``n_view``, the share ``share_right`` that has a same one in view 0, with ``low_right,
         high_right``; ``scale_shift``, the median of log2(sigma' / sigma) over the pairs of nearest
-        same keypoints of either table, with its quartiles ``q25_shift, q75_shift``; and for the same
+        same keypoints of either table, with its quartiles ``q25_shift, q75_shift``; and for these
         pairs the medians ``blob_shift``, that the closed form for blobs predicts, and
         ``dilation_shift``, of a mere dilation; NaN where no such scale exists.
     """

@@ -371,7 +371,9 @@ def fig12() -> dict[str, pd.DataFrame]:
     clean = 0.4 + 0.2 * np.sin(x / 7) * np.cos(y / 5) + 0.2 * (np.hypot(y - 20, x - 40) < 12)
     draw = np.random.default_rng(12)
     pixels = [
-        pd.DataFrame({"noise": n, "y": y + 80, "x": x + 168, "grey": clean + draw.normal(0, n, 4096)})
+        pd.DataFrame(
+            {"noise": n, "y": y + 80, "x": x + 168, "grey": clean + draw.normal(0, n, 4096)}
+        )
         for n in NOISES
     ]
     sigma = 1.1 * 2 ** np.linspace(0, 2, 41)

@@ -8,12 +8,15 @@ import time
 import pytest
 from project import QUICK
 
-FIGURES = {f"fig{n}" for n in range(1, 7)}
+FIGURES = {f"fig{n}" for n in (*range(1, 7), 10, 11, 12, "S2")}
 AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
 MATCHING = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
-DETECTION = {"detect", "detect_stored", "detect_grid", "count_refined"} | MATCHING
-STILL = {"simulate", "scale_space"} | DETECTION
-EVERYTHING = STILL | FIGURES | {"semigroup", "describe_views"}
+DETECTION_STILL = {"detect", "detect_stored", "detect_grid", "count_refined"} | MATCHING
+MATCHING_VIEWS = {"match_sweep", "match_blurs", "fig10", "fig11", "fig12", "figS2"}
+DETECTION = DETECTION_STILL | {"detect_views"} | MATCHING_VIEWS
+STILL = {"simulate", "scale_space"} | DETECTION_STILL
+VIEWS = STILL | DETECTION | {"describe_views", "crop_views", "fig2"}
+EVERYTHING = VIEWS | FIGURES | {"semigroup", "noise_theory"}
 
 
 def reruns(project) -> set[str]:
@@ -36,7 +39,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
         ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
-        ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"simulate", "describe_views", "fig2", "cut_cubes"} | STILL),
+        ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", VIEWS),
         ("workflow/report/fig3.rst", "", "A better caption. ", set()),
         ("environment.lock", "numpy==", "# another numpy\nnumpy==", EVERYTHING),
     ],
@@ -54,11 +57,14 @@ def test_edits_of_code(finished, name, old, new, expected):
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("refinement: {max_offset: 0.7}", {"count_refined"}),
-        ("refinement: {move: unit_step}", {"detect", "detect_stored", "count_refined"} | MATCHING),
-        ("comparison: {match_sign: true}", MATCHING),
-        ("comparison: {last_scale: 2.0}", MATCHING | {"count_refined"}),
-        ("comparison: {scale_ratio: 1.5}", MATCHING),
+        ("refinement: {max_offset: 0.7}", {"count_refined"} | MATCHING_VIEWS),
+        ("refinement: {move: unit_step}", DETECTION - {"detect_grid"}),
+        ("comparison: {match_sign: true}", MATCHING | MATCHING_VIEWS),
+        ("comparison: {last_scale: 2.0}", MATCHING | MATCHING_VIEWS | {"count_refined"}),
+        ("comparison: {scale_ratio: 1.5}", MATCHING | MATCHING_VIEWS),
+        ("stability: {seen_by: 0.6}", {"match_sweep", "fig10", "fig11", "fig12"}),
+        ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12"}),
+        ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),

@@ -132,3 +132,80 @@ use rule fig1 as fig6 with:
         module="keystab.figures.fig6",
         code=fingerprint("keystab.figures.fig6"),
         software=SOFTWARE,
+
+
+use rule fig1 as fig10 with:
+    input:
+        f"{RESULTS}/tables/fig10_counts.csv",
+        f"{RESULTS}/tables/fig10_curves.csv",
+    output:
+        pdf=f"{DRAWN}/fig10.pdf",
+        png=report(f"{DRAWN}/fig10.png", caption="../report/fig10.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig10.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig10.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig10",
+        code=fingerprint("keystab.figures.fig10"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig11 with:
+    input:
+        f"{RESULTS}/tables/fig11_curves.csv",
+        f"{RESULTS}/tables/fig11_scales.csv",
+    output:
+        pdf=f"{DRAWN}/fig11.pdf",
+        png=report(f"{DRAWN}/fig11.png", caption="../report/fig11.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig11.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig11.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig11",
+        code=fingerprint("keystab.figures.fig11"),
+        software=SOFTWARE,
+
+
+use rule fig1 as fig12 with:
+    input:
+        f"{RESULTS}/tables/fig12_curves.csv",
+        f"{RESULTS}/tables/fig12_pixels.parquet",
+        f"{RESULTS}/tables/fig12_scales.csv",
+        f"{RESULTS}/tables/fig12_theory.csv",
+    output:
+        pdf=f"{DRAWN}/fig12.pdf",
+        png=report(f"{DRAWN}/fig12.png", caption="../report/fig12.rst", category="Figures"),
+    log:
+        f"{LOGS}/fig12.log",
+    benchmark:
+        f"{LOGS}/benchmarks/fig12.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.fig12",
+        code=fingerprint("keystab.figures.fig12"),
+        software=SOFTWARE,
+
+
+use rule fig1 as figS2 with:
+    input:
+        f"{RESULTS}/tables/figS2.csv",
+    output:
+        pdf=f"{DRAWN}/figS2.pdf",
+        png=report(f"{DRAWN}/figS2.png", caption="../report/figS2.rst", category="Figures"),
+    log:
+        f"{LOGS}/figS2.log",
+    benchmark:
+        f"{LOGS}/benchmarks/figS2.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.figs2",
+        code=fingerprint("keystab.figures.figs2"),
+        software=SOFTWARE,

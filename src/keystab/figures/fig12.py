@@ -209,7 +209,7 @@ def _draw_rule(ax: Axes, comparisons: Sequence[Comparison], colours: Colours) ->
         ax.plot([half[0]] * 2, whole[1:], color=colour, linewidth=1.0, label="interval")
         ax.plot(half[1:], [whole[0]] * 2, color=colour, linewidth=1.0, label="interval")
         ax.plot([half[0]], [whole[0]], "o", color=colour, markersize=4.0, label=f"{noise:g}")
-        place = {"right": 3.0, "up": 2.0, "ha": "left", "va": "bottom"}
+        place: dict[str, Any] = {"right": 3.0, "up": 2.0, "ha": "left", "va": "bottom"}
         style.direct_label(ax, half[0], whole[0], f"{noise:g}", colour, **place)
     if not comparisons:
         text = "no noise is half of another"

@@ -32,7 +32,7 @@ TABLES = {
 }
 """Files read, with the columns that they must have."""
 
-SHARES = {"found": "right keypoints found again", "right": "found keypoints that are right"}
+SHARES = {"found": "right keypoints found again", "right": "found ones that are right"}
 """What the lines of the shares are of."""
 
 SHIFTS: dict[str, tuple[str, dict[str, Any]]] = {
