@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from keystab.figures import palette, style
 from keystab.figures._render import Tables, check_tables, main
 from keystab.figures._sweep_panels import CURVE_COLUMNS, Colours, draw_curves, require_values
@@ -67,7 +69,7 @@ def _draw_counts(ax: Axes, counts: DataFrame, colours: Colours) -> None:
     ax.vlines(blur, *ends, colors=list(colours.values()), linewidth=1.2, zorder=2)
     ax.scatter(blur, mean, s=14, c=list(colours.values()), zorder=3)
     ax.set_xlim(0.0, 1.06 * blur[-1])
-    ax.set_ylim(0.0, 1.15 * max(ends[1].max(), mean.max()))
+    ax.set_ylim(0.0, 1.15 * np.nanmax([*ends[1], *mean, 1.0]))
     ax.set_xlabel("camera blur $c$ (px)")
     ax.set_ylabel("keypoints per view")
     style.finish_axes(ax)

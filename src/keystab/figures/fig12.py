@@ -181,12 +181,12 @@ def _draw_counts(ax: Axes, scales: DataFrame, colours: Colours) -> None:
     ends = draw_against_scale(
         ax, known, "noise", colours, "mean_above", ("low_above", "high_above")
     )
-    ax.set_yscale("log")
     shown = known.loc[known["noise"].isin(list(colours)), columns].to_numpy(dtype=float)
-    if np.isfinite(shown).any():
-        ax.set_ylim(0.8 * np.nanmin(shown), 1.25 * np.nanmax(shown))
     ax.set_ylabel("keypoints per view")
-    _plain_numbers(ax)
+    if np.isfinite(shown).any():
+        ax.set_yscale("log")
+        ax.set_ylim(0.8 * np.nanmin(shown), 1.25 * np.nanmax(shown))
+        _plain_numbers(ax)
     label_ends(ax, ends, SYMBOL, 0.1)
 
 
@@ -212,7 +212,7 @@ def _draw_rule(ax: Axes, comparisons: Sequence[Comparison], colours: Colours) ->
         place: dict[str, Any] = {"right": 3.0, "up": 2.0, "ha": "left", "va": "bottom"}
         style.direct_label(ax, half[0], whole[0], f"{noise:g}", colour, **place)
     if not comparisons:
-        text = "no noise is half of another"
+        text = "nothing to compare"
         place = {"transform": ax.transAxes, "ha": "center", "fontsize": style.SMALL}
         ax.text(0.5, 0.5, text, color=palette.GREY, **place)
     ticks = range(0, 101, 25)
