@@ -6,7 +6,10 @@ with c < c' at smaller ones: a blob is detected at
 
 .. math:: \sigma' = \sqrt{\sigma^2 + (c^2 - c'^2) / \kappa}
 
-instead of :math:`\sigma` (see `keystab.blobs`).
+instead of :math:`\sigma` (see `keystab.blobs`). A mere dilation of the scale axis, in which each
+Gaussian of the scale-space is only misnamed, would move keypoints the other way, to
+:math:`\sqrt{\sigma^2 + c'^2 - c^2}`; but the ratio of the two Gaussians of a difference changes as
+well.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from keystab.duplicates import matched, pairs_between
 from keystab.intervals import wilson_interval
@@ -35,7 +39,8 @@ def blur_error_table(
     ----------
     keypoints : DataFrame
         ``view, y, x, sigma`` of the refined keypoints of all views, in one frame. View 0 has the
-        assumed blur.
+        assumed blur. All scales that were searched: if they were cut at the lower end of a range,
+        what moves below it would count as lost.
     blurs : sequence of float
         True blur c of every view, in pixels.
     assumed : float
@@ -55,15 +60,17 @@ def blur_error_table(
         its 95 % Wilson interval ``low_found, high_found``; of the view's keypoints in the range
         ``n_view``, the share ``share_right`` that has a same one in view 0, with ``low_right,
         high_right``; ``scale_shift``, the median of log2(sigma' / sigma) over the pairs of nearest
-        same keypoints of either table, with its quartiles ``q25_shift, q75_shift``; and
-        ``blob_shift``, the median that the closed form for blobs predicts for the same pairs.
+        same keypoints of either table, with its quartiles ``q25_shift, q75_shift``; and for these
+        pairs the medians ``blob_shift``, that the closed form for blobs predicts, and
+        ``dilation_shift``, of a mere dilation; NaN where no such scale exists.
     """
     right = keypoints[keypoints["view"] == 0].reset_index(drop=True)
     rows = []
     for number, blur in enumerate(blurs):
         view = keypoints[keypoints["view"] == number].reset_index(drop=True)
         found, correct = matched(right, view, **same), matched(view, right, **same)
-        shift, predicted, sigma = _shifts(right, view, (blur**2 - assumed**2) / kappa, same)
+        shift, sigma = _shifts(right, view, same)
+        more = blur**2 - assumed**2
         for name, (low, high) in scales.items():
             inside = right["sigma"].between(low, high).to_numpy()
             theirs = view["sigma"].between(low, high).to_numpy()
@@ -79,7 +86,8 @@ def blur_error_table(
                     **_share("right", "found", found[inside]),
                     **_share("view", "right", correct[theirs]),
                     **dict(zip(("scale_shift", "q25_shift", "q75_shift"), quartiles, strict=True)),
-                    "blob_shift": np.median(predicted[pairs]) if pairs.any() else np.nan,
+                    "blob_shift": _median_of_closed_form(sigma[pairs], more / kappa),
+                    "dilation_shift": _median_of_closed_form(sigma[pairs], -more),
                 }
             )
     return pd.DataFrame(rows)
@@ -95,16 +103,25 @@ def _share(members: str, kind: str, which: np.ndarray) -> dict[str, float]:
     }
 
 
+def _median_of_closed_form(sigma: NDArray[np.float64], change: float) -> float:
+    """Median of log2(sqrt(sigma**2 + change) / sigma); NaN where most have a negative root."""
+    if not len(sigma):
+        return np.nan
+    with np.errstate(divide="ignore"):
+        middle = float(np.median(np.log2(np.maximum(1 + change / sigma**2, 0.0)) / 2))
+    return middle if np.isfinite(middle) else np.nan
+
+
 def _shifts(
-    right: pd.DataFrame, view: pd.DataFrame, change: float, same: Mapping[str, Any]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Measured and predicted log2 ratio of scales of mutually nearest keypoints, and their sigma.
+    right: pd.DataFrame, view: pd.DataFrame, same: Mapping[str, Any]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Log2 ratio of the scales of mutually nearest keypoints, and their scale in `right`.
 
     Nearest in space alone: the nearest in scale would hide the shift that is asked for.
     """
     i, j, _ = pairs_between(right, view, **same)
     if not len(i):
-        return (np.empty(0),) * 3
+        return np.empty(0), np.empty(0)
     apart = np.hypot(
         right["y"].to_numpy()[i] - view["y"].to_numpy()[j],
         right["x"].to_numpy()[i] - view["x"].to_numpy()[j],
@@ -115,6 +132,4 @@ def _shifts(
     mutual = [(a, b) for a, b in nearest_i.items() if nearest_j[b] == a]
     a, b = (np.array(side, dtype=np.intp) for side in zip(*mutual, strict=True))
     before, after = right["sigma"].to_numpy()[a], view["sigma"].to_numpy()[b]
-    with np.errstate(invalid="ignore"):
-        expected = np.sqrt(np.maximum(before**2 + change, 0.0))
-    return np.log2(after / before), np.log2(np.maximum(expected, 1e-9) / before), before
+    return np.log2(after / before), before

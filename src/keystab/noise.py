@@ -76,6 +76,10 @@ def dog_noise(sigma: ArrayLike, camera_blur: float, kappa: float) -> NDArray[np.
     Far above the camera blur the variance is that of continuous white noise,
     :math:`(1/\kappa^2 + 1 - 4/(\kappa^2 + 1)) / (4\pi\sigma^2)`: half the noise per octave.
 
+    The noise between pixels is taken to have the band of the grid, as with oversampling by
+    cosines. The cubic spline damps the highest frequencies: at scale 1.1 and blur 0.8 it leaves 4 %
+    less, from 1.4 on less than 1 %.
+
     Examples
     --------
     >>> finer, coarser = (dog_noise(np.array(s), 0.8, 1.26) for s in ([1.1, 11.0], [2.2, 22.0]))

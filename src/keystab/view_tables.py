@@ -224,7 +224,7 @@ def scale_table(
     -------
     DataFrame
         One row per start: `labels`; ``sigma_from``; ``n_unique``, of the octave; ``n_seen`` of
-        them, in at least `seen_by` of the views; ``percentage_seen`` with ``low, high``;
+        them, in at least ``seen_by`` of the views; ``percentage_seen`` with ``low, high``;
         ``mean_above``, keypoints per view at scales of at least ``sigma_from`` and without upper
         end, with ``low_above, high_above`` (1.96 standard errors over views).
     """
@@ -247,6 +247,7 @@ def scale_table(
             {
                 "sigma_from": start,
                 "n_unique": len(matched.found),
+                "seen_by": seen_by,
                 "n_seen": int(curve["n_unique"]),
                 "percentage_seen": curve["percentage_of_unique"],
                 "low": curve["low"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
+from types import ModuleType
 
 import numpy as np
 import pandas as pd
@@ -19,14 +20,20 @@ SAMPLINGS = tuple(range(3, 20))
 @cache
 def tables(n: int | str) -> dict[str, pd.DataFrame]:
     """Return the tables of figure `n`; do not change them."""
-    makers = {1: fig1, 2: fig2, 3: fig3, 4: fig4, 5: fig5, 7: fig7, 8: fig8, 9: fig9, "s1": figs1}
+    makers = {1: fig1, 2: fig2, 3: fig3, 4: fig4, 5: fig5, 7: fig7, 8: fig8, 9: fig9}
+    makers |= {10: fig10, 11: fig11, 12: fig12, "S1": figs1, "S2": figs2}
     return fig6(per_group=2, half=5) if n == 6 else makers[n]()
 
 
 @cache
 def drawn(n: int | str) -> tuple[dict[str, pd.DataFrame], Figure]:
     """Return the tables of figure `n` and the figure, drawn once for all tests."""
-    return tables(n), import_module(f"keystab.figures.fig{n}").draw(tables(n))
+    return tables(n), module(n).draw(tables(n))
+
+
+def module(n: int | str) -> ModuleType:
+    """Return the module of figure `n`; names of modules are lower case."""
+    return import_module(f"keystab.figures.fig{n}".lower())
 
 
 def balanced(n_spo: int) -> float:
@@ -381,3 +388,128 @@ def fig9() -> dict[str, pd.DataFrame]:
         }
     )
     return {"fig9_counts": counts, "fig9_keypoints": keypoints, "fig9_occurrence": occurrence}
+
+
+N_VIEWS = 32
+STARTS = (1.1, 1.24, 1.39, 1.56, 1.75, 1.96, 2.2)
+BLURS = (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.95, 1.1)
+BLUR_SPREADS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
+NOISES = (0.005, 0.01, 0.015, 0.03, 0.035, 0.07, 0.075, 0.15)
+
+
+def _sweep_curves(column: str, harm: dict[float, float]) -> pd.DataFrame:
+    """Invent stability curves of 32 views; `harm` is 0 (all keypoints stay) or more per value."""
+    from keystab.stability import stability_curve
+
+    draw = np.random.default_rng(10)
+    parts = []
+    for value, badness in harm.items():
+        chance = draw.beta(1.2 / (badness + 0.02), 0.35, int(450 * (1 + badness)))
+        seen = draw.random((len(chance), N_VIEWS)) < chance[:, None]
+        curve = stability_curve(seen[seen.any(axis=1)], n_resamples=40, purpose=(column,))
+        parts.append(curve.assign(**{column: value}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _sweep_counts(column: str, harm: dict[float, float], drop: float) -> pd.DataFrame:
+    """Invent numbers of keypoints per view."""
+    mean = np.array([480 * np.exp(-drop * badness) for badness in harm.values()])
+    mean += np.random.default_rng(11).normal(0, 2, len(mean))
+    error = np.linspace(5, 1.5, len(mean))
+    ends = {"low_detections": mean - error, "high_detections": mean + error}
+    return pd.DataFrame({column: list(harm), "mean_detections": mean, **ends})
+
+
+def _sweep_scales(column: str, harm: dict[float, float], drop: float) -> pd.DataFrame:
+    """Invent what happens octave by octave: harm falls with the square of the scale."""
+    rows = []
+    for value, badness in harm.items():
+        for start in STARTS:
+            here = badness * (STARTS[0] / start) ** 2
+            n_unique = int(700 * (STARTS[0] / start) ** 2 * (1 + here))
+            share = 0.97 * np.exp(-1.1 * here)
+            spread = 1.96 * np.sqrt(share * (1 - share) / n_unique)
+            above = 750 * (STARTS[0] / start) ** 2 * np.exp(-drop * here)
+            rows.append(
+                {
+                    column: value,
+                    "sigma_from": start,
+                    "n_unique": n_unique,
+                    "seen_by": 0.7,
+                    "n_seen": int(share * n_unique),
+                    "percentage_seen": 100 * share,
+                    "low": 100 * max(0.0, share - spread),
+                    "high": 100 * min(1.0, share + spread),
+                    "mean_above": above,
+                    "low_above": above - 0.3 * np.sqrt(above),
+                    "high_above": above + 0.3 * np.sqrt(above),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def fig10() -> dict[str, pd.DataFrame]:
+    """Invent keypoints that get unstable below a blur of 0.6 and not fewer."""
+    harm = {blur: 3 * max(0.0, 0.6 - blur) ** 1.2 + 0.01 for blur in BLURS}
+    return {
+        "fig10_counts": _sweep_counts("blur", harm, 0.02),
+        "fig10_curves": _sweep_curves("blur", harm),
+    }
+
+
+def fig11() -> dict[str, pd.DataFrame]:
+    """Invent keypoints that get unstable with the uncertainty of the blur."""
+    harm = {spread: 2 * spread for spread in BLUR_SPREADS}
+    return {
+        "fig11_curves": _sweep_curves("blur_spread", harm),
+        "fig11_scales": _sweep_scales("blur_spread", harm, 0.0),
+    }
+
+
+def fig12() -> dict[str, pd.DataFrame]:
+    """Invent keypoints that noise makes unstable and rare, and compute its closed form."""
+    from keystab.noise import dog_noise
+
+    harm = {noise: 30 * noise for noise in NOISES}
+    y, x = (grid.ravel() for grid in np.indices((64, 64)))
+    clean = 0.4 + 0.2 * np.sin(x / 7) * np.cos(y / 5) + 0.2 * (np.hypot(y - 20, x - 40) < 12)
+    draw = np.random.default_rng(12)
+    pixels = [
+        pd.DataFrame(
+            {"noise": n, "y": y + 80, "x": x + 168, "grey": clean + draw.normal(0, n, 4096)}
+        )
+        for n in NOISES
+    ]
+    sigma = 1.1 * 2 ** np.linspace(0, 2, 41)
+    ratio = dog_noise(sigma, 0.8, KAPPA) / dog_noise(2 * sigma, 0.8, KAPPA)
+    return {
+        "fig12_curves": _sweep_curves("noise", harm),
+        "fig12_pixels": pd.concat(pixels, ignore_index=True),
+        "fig12_scales": _sweep_scales("noise", harm, 0.9),
+        "fig12_theory": pd.DataFrame({"sigma": sigma, "octave_ratio": ratio}),
+    }
+
+
+def figs2() -> dict[str, pd.DataFrame]:
+    """Invent what 17 wrong blurs do in two octaves; the assumed one stands first, as in a set."""
+    from keystab.intervals import wilson_interval
+
+    blurs = (0.7, *(round(0.3 + 0.05 * k, 2) for k in range(17) if k != 8))
+    rows = []
+    for blur in blurs:
+        for name, n, sigma in (("first octave", 420, 1.75), ("second octave", 110, 3.4)):
+            error, change = blur - 0.7, blur**2 - 0.7**2
+            row = {"blur": blur, "error": error, "scales": name}
+            size = (1.75 / sigma) ** 2
+            for kind, loss in (("found", 0.8), ("right", 0.3)):
+                slope = loss if error < 0 else 1.1 - loss
+                share = 1 - slope * abs(error) * size
+                low, high = wilson_interval(round(share * n), n)
+                row |= {f"share_{kind}": share, f"low_{kind}": low, f"high_{kind}": high}
+            shift = 0.5 * np.log2(1 + 0.35 * change / sigma**2)
+            wide = 0.3 * abs(error) * size
+            row |= {"scale_shift": shift, "q25_shift": shift - wide, "q75_shift": shift + wide}
+            row["blob_shift"] = 0.5 * np.log2(1 + change / KAPPA / sigma**2)
+            row["dilation_shift"] = 0.5 * np.log2(1 - change / sigma**2)
+            rows.append(row)
+    return {"figS2": pd.DataFrame(rows)}

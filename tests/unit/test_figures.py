@@ -1,6 +1,5 @@
 """What every figure promises: files that repeat, text that can be read, errors in one line."""
 
-import importlib
 import subprocess
 import sys
 
@@ -15,12 +14,12 @@ from keystab.figures import style
 from keystab.figures._render import check_tables, main, read_tables, save
 from keystab.tables import write_table
 
-NUMBERS = (1, 2, 3, 4, 5, 6, 7, 8, 9, "s1")
+NUMBERS = (*range(1, 13), "S1", "S2", "S3", "S4")
 
 
 @pytest.fixture(scope="module")
 def modules():
-    return {n: importlib.import_module(f"keystab.figures.fig{n}") for n in NUMBERS}
+    return {n: figure_tables.module(n) for n in NUMBERS}
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +36,7 @@ def drawn():
 def folder(tmp_path, tables):
     def write(n, skip=()):
         for stem, table in tables[n].items():
-            kind = "parquet" if stem in ("fig2_pixels", "fig6_cubes") else "csv"
+            kind = "parquet" if stem in ("fig2_pixels", "fig6_cubes", "fig12_pixels") else "csv"
             if stem not in skip:
                 write_table(table, tmp_path / f"{stem}.{kind}")
         return tmp_path
@@ -88,8 +87,23 @@ def test_text_has_seven_points_or_more_and_nothing_touches_the_edge(n, drawn):
 
 
 @pytest.mark.parametrize(
-    ("n", "letters"), [(1, "abcde"), (2, "abc"), (3, "abcde"), (4, "abcd"), (5, "abcde"), (7, "abcdef"), (8, "abc"), (9, "ab"), ("s1", "abc")],
-)  # fmt: skip
+    ("n", "letters"),
+    [
+        (1, "abcde"),
+        (2, "abc"),
+        (3, "abcde"),
+        (4, "abcd"),
+        (5, "abcde"),
+        (7, "abcdef"),
+        (8, "abc"),
+        (9, "ab"),
+        (10, "ab"),
+        (11, "ab"),
+        (12, "abcdef"),
+        ("S1", "abc"),
+        ("S2", "ab"),
+    ],
+)
 def test_panels_carry_their_letters(n, letters, drawn):
     labels = {ax.get_label() for ax in drawn[n].axes}
     assert set(letters) <= labels

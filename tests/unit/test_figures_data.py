@@ -9,8 +9,23 @@ from matplotlib.colors import to_rgb
 from numpy.testing import assert_allclose, assert_array_equal
 
 from keystab.errors import InputError
-from keystab.figures import fig1, fig2, fig3, fig4, fig5, fig6, fig7, fig8, fig9, palette
-from keystab.figures._stability_panels import spread
+from keystab.figures import (
+    fig1,
+    fig2,
+    fig3,
+    fig4,
+    fig5,
+    fig6,
+    fig7,
+    fig8,
+    fig9,
+    fig10,
+    fig11,
+    fig12,
+    figs2,
+    palette,
+)
+from keystab.figures.style import spread
 
 
 def panel(figure, name):
@@ -341,7 +356,7 @@ def test_figure_7_names_curves_that_are_missing():
 
 
 @pytest.mark.parametrize(
-    ("n", "stem", "panels"), [(7, "fig7", "cd"), (8, "fig8", "bc"), ("s1", "figS1", "bc")]
+    ("n", "stem", "panels"), [(7, "fig7", "cd"), (8, "fig8", "bc"), ("S1", "figS1", "bc")]
 )
 def test_precision_is_drawn_on_logarithmic_axes(n, stem, panels):
     tables, figure = drawn(n)
@@ -359,7 +374,7 @@ def test_precision_is_drawn_on_logarithmic_axes(n, stem, panels):
         assert low > 0.1 * table["low"].min()  # not down to the medians of grid scales, which are 0
 
 
-@pytest.mark.parametrize(("n", "stem"), [(8, "fig8"), ("s1", "figS1")])
+@pytest.mark.parametrize(("n", "stem"), [(8, "fig8"), ("S1", "figS1")])
 def test_figures_8_and_s1_draw_four_curves_and_their_counts(n, stem):
     tables, figure = drawn(n)
     ax = panel(figure, "a")
@@ -412,8 +427,8 @@ def test_heights_are_spread_no_farther_than_needed():
         apart = np.array(spread(heights, 4.0))
         assert (np.diff(apart) > 4 - 1e-9).all()
         assert apart.mean() == pytest.approx(heights.mean())
-        assert np.array(spread(heights, 4.0, 25.0)).max() <= 25
-    assert spread([0.0, 10.0, 20.0], 4.0) == [0.0, 10.0, 20.0]
+        assert np.array(spread(heights, 4.0, high=25.0)).max() <= 25
+    assert spread([0.0, 10.0, 20.0], 4.0).tolist() == [0.0, 10.0, 20.0]
 
 
 def test_figure_9_draws_counts_and_the_matrix_in_order_of_stability():
@@ -449,3 +464,164 @@ def test_figure_9_refuses_an_occurrence_matrix_with_holes():
         InputError, match="fig9_occurrence.csv: lacks some pairs .* a value of kappa"
     ):
         fig9.draw(tables | {"fig9_occurrence": tables["fig9_occurrence"].iloc[1:]})
+
+
+@pytest.mark.parametrize(
+    ("n", "module", "name", "column"),
+    [
+        (10, fig10, "b", "blur"),
+        (11, fig11, "a", "blur_spread"),
+        (12, fig12, "a", "noise"),
+    ],
+)
+def test_sweeps_draw_a_curve_per_value_and_name_it_in_its_colour(n, module, name, column):
+    tables, figure = drawn(n)
+    ax, curves = panel(figure, name), tables[f"fig{n}_curves"]
+    values = [0.01, 0.03, 0.07, 0.15] if n == 12 else sorted(set(curves[column]))
+    assert [drawn.get_label() for drawn in ax.get_lines()] == [f"{value:g}" for value in values]
+    texts = {text.get_text(): text for text in ax.texts}
+    for value in values:
+        rows = curves[curves[column] == value]
+        expected = rows[["percentage_of_images", "percentage_of_unique"]].T
+        assert_array_equal(line(ax, f"{value:g}"), expected)
+        (curve,) = [drawn for drawn in ax.get_lines() if drawn.get_label() == f"{value:g}"]
+        assert texts[f"{value:g}"].get_color() == curve.get_color()
+        assert texts[f"{value:g}"].xy[1] == pytest.approx(expected.iloc[1, -1] / 102)
+    colours = {to_rgb(drawn.get_color()) for drawn in ax.get_lines()}
+    assert len(colours) == len(values)
+    with pytest.raises(InputError, match=rf"has no rows of {column} = {values[0]:g}"):
+        other = "fig10_curves" if n == 10 else f"fig{n}_scales"
+        module.draw(tables | {other: tables[other][tables[other][column] != values[0]]})
+
+
+def test_bands_hold_what_the_tables_say():
+    tables, figure = drawn(10)
+    curves = tables["fig10_curves"]
+    bands = panel(figure, "b").collections
+    assert len(bands) == 3
+    for blur, band in zip((0.25, 0.6, 1.1), bands, strict=True):
+        rows = curves[curves["blur"] == blur]
+        corners = band.get_paths()[0].vertices
+        assert (corners[:, 1].min(), corners[:, 1].max()) == (
+            rows["low"].min(),
+            rows["high"].max(),
+        )
+
+
+def test_figure_10_counts_from_zero_with_intervals():
+    tables, figure = drawn(10)
+    ax, counts = panel(figure, "a"), tables["fig10_counts"]
+    assert_array_equal(line(ax, "mean_detections"), counts[["blur", "mean_detections"]].T)
+    assert ax.get_ylim()[0] == 0 and ax.get_ylim()[1] > counts["high_detections"].max()
+    segments = np.array(ax.collections[0].get_segments())
+    assert_array_equal(segments[:, 0], counts[["blur", "low_detections"]])
+    assert_array_equal(segments[:, 1], counts[["blur", "high_detections"]])
+    colours = np.array([to_rgb(drawn.get_color()) for drawn in panel(figure, "b").get_lines()])
+    assert_array_equal(ax.collections[1].get_facecolor()[:, :3], colours)
+
+
+def test_figure_11_draws_percentages_and_counts_against_scale():
+    tables, figure = drawn(11)
+    scales = tables["fig11_scales"]
+    for name, column in (("b", "percentage_seen"), ("b counts", "n_unique")):
+        for spread_of_blur in figure_tables.BLUR_SPREADS:
+            rows = scales[scales["blur_spread"] == spread_of_blur]
+            expected = rows[["sigma_from", column]].T
+            assert_array_equal(line(panel(figure, name), f"{spread_of_blur:g}"), expected)
+    assert "70 % of views" in panel(figure, "b").get_ylabel()
+    assert len(panel(figure, "b").collections) == len(figure_tables.BLUR_SPREADS)
+
+
+def test_figure_12_draws_counts_crops_and_theory():
+    tables, figure = drawn(12)
+    scales = tables["fig12_scales"]
+    for noise in (0.01, 0.03, 0.07, 0.15):
+        rows = scales[scales["noise"] == noise]
+        for name, column in (("c", "mean_above"), ("d", "percentage_seen")):
+            expected = rows[["sigma_from", column]].T
+            assert_array_equal(line(panel(figure, name), f"{noise:g}"), expected)
+        pixels = tables["fig12_pixels"].query("noise == @noise").sort_values(["y", "x"])["grey"]
+        (crop,) = [c for c in panel(figure, "b").images if c.get_label() == f"{noise:g}"]
+        assert_array_equal(crop.get_array(), pixels.to_numpy().reshape(64, 64))
+        assert (crop.norm.vmin, crop.norm.vmax) == (0.0, 1.0)
+    assert panel(figure, "c").get_yscale() == "log"
+    ratio = tables["fig12_theory"][["sigma", "octave_ratio"]].T
+    assert_array_equal(line(panel(figure, "f"), "octave_ratio"), ratio)
+    texts = [text.get_text() for text in panel(figure, "f").texts]
+    assert "in the paper: 2" in texts
+
+
+def test_figure_12_compares_octaves_at_half_the_noise():
+    tables, figure = drawn(12)
+    scales = tables["fig12_scales"].set_index(["noise", "sigma_from"])
+    compared = fig12.compare_octaves(tables["fig12_scales"])
+    assert [one.noise for one in compared] == [0.01, 0.03, 0.07, 0.15]
+    for noise, half, whole in compared:
+        columns = ["percentage_seen", "low", "high"]
+        assert_array_equal(half, scales.loc[(noise / 2, 1.1), columns])
+        assert_array_equal(whole, scales.loc[(noise, 2.2), columns])
+        assert_array_equal(line(panel(figure, "e"), f"{noise:g}"), [[half[0]], [whole[0]]])
+    assert_array_equal(line(panel(figure, "e"), "equal"), [[0, 100], [0, 100]])
+
+
+def test_figure_12_says_where_octaves_cannot_be_compared():
+    tables = figure_tables.tables(12)
+    scales = tables["fig12_scales"]
+    for rows in (scales[scales["sigma_from"] < 2.2], scales.assign(noise=scales["noise"] ** 2)):
+        assert fig12.compare_octaves(rows) == []
+    figure = fig12.draw(tables | {"fig12_scales": scales[scales["sigma_from"] < 2.2]})
+    texts = [text.get_text() for text in panel(figure, "e").texts]
+    assert "nothing to compare" in texts
+
+
+def test_figure_12_leaves_out_what_a_logarithm_cannot_show():
+    tables = figure_tables.tables(12)
+    scales = tables["fig12_scales"].copy()
+    scales.loc[scales["noise"] == 0.15, ["mean_above", "low_above", "high_above"]] = 0.0
+    figure = fig12.draw(tables | {"fig12_scales": scales})
+    ax = panel(figure, "c")
+    assert np.isnan(line(ax, "0.15")[1]).all()
+    assert {text.get_text() for text in ax.texts} == {"noise", "0.01", "0.03", "0.07"}
+    figure = fig12.draw(
+        tables | {"fig12_scales": scales.assign(mean_above=0.0, low_above=0.0, high_above=0.0)}
+    )
+    assert len(panel(figure, "c").texts) == 0
+
+
+def test_figure_12_refuses_a_crop_with_holes():
+    tables = figure_tables.tables(12)
+    pixels = tables["fig12_pixels"]
+    first = pixels.index[pixels["noise"] == 0.01]
+    for wrong in (pixels.drop(first[5]), pd.concat([pixels, pixels.loc[first[:1]]])):
+        with pytest.raises(InputError, match=r"the pixels of noise 0\.01 fill no rectangle"):
+            fig12.draw(tables | {"fig12_pixels": wrong})
+
+
+def test_figure_s2_draws_shares_and_shifts_in_the_order_of_the_error():
+    tables, figure = drawn("S2")
+    assert tables["figS2"]["error"].iloc[0] == 0  # the right view comes first
+    table = tables["figS2"]
+    for name, suffix in (("first octave", ""), ("second octave", " second octave")):
+        rows = table[table["scales"] == name].sort_values("error")
+        shares, shifts = panel(figure, f"a{suffix}"), panel(figure, f"b{suffix}")
+        for kind in figs2.SHARES:
+            error, share = line(shares, kind)
+            assert_array_equal(error, rows["error"])
+            assert_array_equal(share, 100 * rows[f"share_{kind}"])
+        for kind in figs2.SHIFTS:
+            assert_array_equal(line(shifts, kind), rows[["error", f"{kind}_shift"]].T)
+        assert len(shares.collections) == 2 and len(shifts.collections) == 1
+    names = {text.get_text(): text.get_color() for text in panel(figure, "b").texts}
+    assert names == {text: look["color"] for text, look in figs2.SHIFTS.values()}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_labels_keep_their_distance_order_and_bounds(seed):
+    draw = np.random.default_rng(seed)
+    wanted = draw.random(9)
+    places = spread(wanted, 0.1, 0.0, 1.0)
+    assert np.diff(np.sort(places)).min() > 0.1 - 1e-12
+    assert_array_equal(np.argsort(places), np.argsort(wanted))
+    assert places.min() >= 0 and places.max() <= 1 + 1e-12
+    apart = np.linspace(0.05, 0.95, 9)
+    assert_allclose(spread(apart, 0.1, 0.0, 1.0), apart)  # nothing to do

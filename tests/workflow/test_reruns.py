@@ -8,17 +8,22 @@ import time
 import pytest
 from project import QUICK
 
-FIGURES = {f"fig{n}" for n in (*range(1, 10), "S1")}
+FIGURES = {f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")} | {"floor"}
 AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
 SAMPLINGS = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
 VIEWS = {"match_views", "match_shipped", "fig7", "fig8", "figS1"}
+SWEEPS = {"match_sweep", "match_blurs", "fig10", "fig11", "fig12", "figS2"}
 KAPPAS = {"match_kappas", "fig9"}
-MATCHING = SAMPLINGS | VIEWS | KAPPAS
+VARIANTS = {"match_variants", "floor"}
+MATCHING = SAMPLINGS | VIEWS | SWEEPS | KAPPAS | VARIANTS
 ONE_VIEW = {"detect", "detect_stored", "detect_grid", "count_refined"} | SAMPLINGS
-DETECTION = ONE_VIEW | {"detect_views", "detect_kappas"} | MATCHING
-STILL = {"simulate", "scale_space", "detect_kappas"} | ONE_VIEW | KAPPAS
-SIMULATION = STILL | DETECTION
-EVERYTHING = SIMULATION | FIGURES | {"semigroup", "describe_views"}
+DETECTION = ONE_VIEW | {"detect_views", "detect_kappas", "detect_variant"} | MATCHING
+STILL = (
+    {"simulate", "scale_space", "detect_kappas", "detect_variant"} | ONE_VIEW | KAPPAS | VARIANTS
+)
+SIMULATION = STILL | DETECTION | {"describe_views", "crop_views", "fig2"}
+THEORY = {"semigroup", "noise_theory"}
+EVERYTHING = SIMULATION | FIGURES | THEORY
 
 
 def reruns(project) -> set[str]:
@@ -41,7 +46,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
         ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
-        ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"simulate", "describe_views", "fig2", "cut_cubes"} | SIMULATION),
+        ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", SIMULATION),
         ("workflow/report/fig3.rst", "", "A better caption. ", set()),
         ("environment.lock", "numpy==", "# another numpy\nnumpy==", EVERYTHING),
     ],
@@ -59,11 +64,14 @@ def test_edits_of_code(finished, name, old, new, expected):
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | KAPPAS),
-        ("refinement: {move: unit_step}", DETECTION - {"detect_grid"}),
+        ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS),
+        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "detect_variant"} - VARIANTS),
         ("comparison: {match_sign: true}", MATCHING),
-        ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS),
+        ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS | SWEEPS | VARIANTS),
         ("comparison: {scale_ratio: 1.5}", MATCHING),
+        ("stability: {seen_by: 0.6}", {"match_sweep", "fig10", "fig11", "fig12"}),
+        ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12"}),
+        ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),

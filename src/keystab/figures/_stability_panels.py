@@ -122,7 +122,7 @@ def end_labels(
         points = ax.bbox.height / per_point / np.ptp(ax.get_ylim())
         ends = [label.height * points for label in sorted(panels[ax], key=lambda one: one.height)]
         top = ax.get_ylim()[1] * points
-        heights = [*spread(ends, distance, top - distance / 2), top + 8.0]
+        heights = [*style.spread(ends, distance, high=top - distance / 2), top + 8.0]
         up = np.subtract(heights, [*ends, top])
         widths = [Text.get_window_extent(text).width for text in names[ax]]  # without leaders
         right = 10.0 + 5.0 + max(widths, default=0.0) / per_point
@@ -146,59 +146,6 @@ def _end_text(ax: Axes, label: EndLabel, text: str, leader: bool = False) -> Any
         annotation_clip=False,
         arrowprops=line | {"shrinkA": 0.0, "shrinkB": 0.0} if leader else None,
     )
-
-
-def spread(
-    heights: Sequence[float], distance: float, highest: float = float("inf")
-) -> list[float]:
-    """Move heights apart until none is nearer to the next than `distance`, and no farther.
-
-    Parameters
-    ----------
-    heights : sequence of float
-        In increasing order.
-    distance : float
-        Least distance of neighbours.
-    highest : float
-        Upper limit of the answer.
-
-    Returns
-    -------
-    list of float
-        The least squares answer, groups that would overlap being centred on their mean, and moved
-        down where it exceeds the limit.
-
-    Examples
-    --------
-    >>> spread([0.0, 1.0, 10.0], 3.0)
-    [-1.0, 2.0, 10.0]
-    >>> spread([0.0, 1.0, 10.0], 3.0, 9.0)
-    [-1.0, 2.0, 9.0]
-    """
-    groups: list[list[float]] = []
-    for height in heights:
-        groups.append([height])
-        while len(groups) > 1 and _lowest(groups[-1], distance) < distance + _highest(
-            groups[-2], distance
-        ):
-            groups[-2:] = [groups[-2] + groups[-1]]
-    apart = [
-        _lowest(group, distance) + distance * place
-        for group in groups
-        for place in range(len(group))
-    ]
-    below = range(len(apart) - 1, -1, -1)
-    return [min(height, highest - distance * k) for height, k in zip(apart, below, strict=True)]
-
-
-def _lowest(group: Sequence[float], distance: float) -> float:
-    """Return where the lowest of a group comes to lie."""
-    return float(np.mean(group)) - distance * (len(group) - 1) / 2
-
-
-def _highest(group: Sequence[float], distance: float) -> float:
-    """Return where the highest of a group comes to lie."""
-    return float(np.mean(group)) + distance * (len(group) - 1) / 2
 
 
 def curve_axes(ax: Axes) -> None:

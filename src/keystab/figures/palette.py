@@ -7,7 +7,7 @@ perceptually uniform and nearly the same for every reader.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,6 +64,13 @@ TOLERANCE_COLOURS = {
 }
 """Tolerances of the comparison with neighbours (figure floor)."""
 
+
+COMPARED_COLOURS = {"found": CHANGE_COLOURS["lost"], "right": CHANGE_COLOURS["new"]}
+"""Shares of keypoints that are not lost, and that are not new (figure S2)."""
+
+THEORY_COLOURS = {"blob": "#0072B2", "dilation": "#A8458A"}
+"""What closed forms predict (figures 12 and S2)."""
+
 BALANCED_COLOUR = INK
 """The balanced sampling curve."""
 
@@ -113,6 +120,29 @@ def offset_colour(max_offset: float) -> tuple[float, float, float]:
     channels = zip(*map(to_rgb, _OFFSETS), strict=True)
     red, green, blue = (float(np.interp(0.5 / max_offset, stops, one)) for one in channels)
     return red, green, blue
+
+
+def sweep_colours(values: Iterable[float]) -> dict[float, tuple[float, float, float]]:
+    """Return a colour for each value of a sweep: dark blue for the lowest, orange for the highest.
+
+    Parameters
+    ----------
+    values : iterable of float
+        Values of the sweep, in any order and repeated at will; their ranks decide.
+
+    Examples
+    --------
+    >>> list(sweep_colours([0.8, 0.25, 0.8]))
+    [0.25, 0.8]
+    """
+    import matplotlib
+
+    steps = sorted({float(value) for value in values})
+    shades = matplotlib.colormaps["plasma"](np.linspace(0.0, 0.74, len(steps)))
+    return {
+        value: (float(red), float(green), float(blue))
+        for value, (red, green, blue, _) in zip(steps, shades, strict=True)
+    }
 
 
 def stability_map() -> Colormap:

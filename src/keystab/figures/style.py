@@ -5,7 +5,7 @@ Text is 7 pt or more at the width of two paper columns. `keystab.figures.palette
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -266,3 +266,40 @@ def sampling_axis(ax: Axes, samplings: Iterable[int]) -> None:
     ticks = sorted({int(n_spo) for n_spo in samplings})
     ax.set_xticks(ticks[:: 1 if len(ticks) <= 10 else 2])
     ax.set_xlabel(f"{N_SPO} (scales per octave)")
+
+
+def spread(
+    places: Sequence[float], gap: float, low: float = -np.inf, high: float = np.inf
+) -> NDArray[np.float64]:
+    """Move places as little as possible, so that they keep a distance; their order stays.
+
+    Parameters
+    ----------
+    places : sequence of float
+        Where they would be.
+    gap : float
+        Least distance of neighbours.
+    low, high : float
+        Where they must stay, as far as there is room.
+
+    Returns
+    -------
+    ndarray
+        The places nearest to the given ones in the sense of least squares, in the same order.
+
+    Examples
+    --------
+    >>> spread([0.5, 0.5, 0.9], 0.2, 0.0, 1.0).round(2).tolist()
+    [0.4, 0.6, 0.9]
+    >>> spread([0.9, 1.0], 0.2, 0.0, 1.0).round(2).tolist()
+    [0.8, 1.0]
+    """
+    from scipy.optimize import isotonic_regression
+
+    wanted = np.asarray(places, dtype=float)
+    order = np.argsort(wanted, kind="stable")
+    steps = gap * np.arange(len(wanted))
+    free = isotonic_regression(wanted[order] - steps).x
+    result = np.empty(len(wanted))
+    result[order] = np.clip(free, low, max(low, high - steps[-1])) + steps
+    return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from keystab.stages import _run
@@ -41,8 +42,10 @@ def main(argv: Sequence[str] | None = None) -> None:
         read_table(args.extrema), read_table(args.traces), args.max_offset, args.max_iterations
     )
     low = everywhere.low
+    # Keypoints move across the ends of the ranges: those beyond are needed as counterparts.
+    searched = replace(everywhere, low=0.0)
     table = blur_error_table(
-        everywhere.common(keypoints),
+        searched.common(keypoints),
         blurs,
         args.assumed_blur,
         args.kappa,

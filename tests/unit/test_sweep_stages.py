@@ -1,0 +1,138 @@
+"""Sets of views that differ in one value: what is matched within each, and what is cropped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scenes
+
+from keystab.pictures import write_picture
+from keystab.stages import crop_views, detect_views, match_sweep, noise_theory, simulate
+from keystab.stages._inputs import read_view
+from keystab.tables import read_table
+
+KAPPA = "1.2599210498948732"
+NOISES = (0.0, 0.02)
+N_VIEWS = 3
+
+
+@pytest.fixture(scope="module")
+def sets(tmp_path_factory) -> list[Path]:
+    """Two sets of three views of one scene: without noise, so that all are the same, and with."""
+    folder = tmp_path_factory.mktemp("sweep")
+    write_picture(scenes.blobs((180, 220), 5), folder / "scene.tif")
+    members = []
+    for noise in NOISES:
+        member = folder / f"noise_{noise}"
+        member.mkdir()
+        views = ["--store", str(member / "views"), "--digest", str(member / "views.sha256")]
+        arguments = [
+            *("--reference", str(folder / "scene.tif"), "--reference-sha256", "None"),
+            *("--reference-blur", "0.0", "--set", "noise", "--blur", "0.8", "--step", "2"),
+            *("--shift-y", "0.0", "--shift-x", "0.0", "--rotation", "0.0"),
+            *("--noise", *[str(noise)] * N_VIEWS, "--height", "None", "--width", "None"),
+            *("--whole", "False", "--guard", "0", "--dtype", "float64", *views),
+        ]
+        assert simulate.main(arguments) == 0
+        arguments = [
+            *("--views", str(member / "views"), "--views-digest", str(member / "views.sha256")),
+            *("--n-spo", "4", "--assumed-blur", "None", "--n-oct", "2", "--delta-min", "None"),
+            *("--sigma-min", "1.1", "--kappa", KAPPA, "--oversampling", "spline"),
+            *("--epsilon", "0.0", "--scale-moves", "True", "--move", "nearest"),
+            *("--max-offset", "None", "--extrema", str(member / "extrema.parquet")),
+            *("--traces", str(member / "traces.parquet")),
+        ]
+        assert detect_views.main(arguments) == 0
+        members.append(member)
+    return members
+
+
+def files(sets, name):
+    return [str(member / name) for member in sets]
+
+
+def matching(sets, folder, *more):
+    return [
+        *("--views", *files(sets, "views"), "--views-digest", *files(sets, "views.sha256")),
+        *("--extrema", *files(sets, "extrema.parquet"), "--traces", *files(sets, "traces.parquet")),
+        *("--name", "noise", "--values", *map(str, NOISES), "--sigma-min", "1.1", "--n-oct", "2"),
+        *("--guard", "0", "--border", "3.0", "--first-scale", KAPPA, "--last-scale", "None"),
+        *("--space-tolerance", "1.0", "--scale-ratio", "1.4142135623730951"),
+        *("--match-sign", "False", "--max-offset", "0.6", "--max-iterations", "2"),
+        *("--seen-by", "0.7", "--n-resamples", "20", "--curves", str(folder / "curves.csv")),
+        *("--counts", str(folder / "counts.csv"), *more),
+    ]
+
+
+def test_each_set_of_a_sweep_is_matched_within_itself(sets, tmp_path):
+    scales = ["--starts", "1.1", "2.2", "--scales", str(tmp_path / "scales.csv")]
+    assert match_sweep.main(matching(sets, tmp_path, *scales)) == 0
+    counts, curves, table = (
+        read_table(tmp_path / f"{name}.csv") for name in ("counts", "curves", "scales")
+    )
+    assert counts["noise"].tolist() == list(NOISES)
+    assert (counts["n_views"] == N_VIEWS).all()
+    same, noisy = (row for _, row in counts.iterrows())
+    # Three times the same view: every keypoint is seen in all, and their number does not vary.
+    assert same["mean_detections"] == same["low_detections"] >= same["n_unique"] > 20
+    assert same["share_always"] == 1 > noisy["share_always"]
+    assert len(curves) == 2 * N_VIEWS
+    assert (curves.loc[curves["noise"] == 0, "percentage_of_unique"] == 100).all()
+    noise_free = table[table["noise"] == 0]
+    assert table["sigma_from"].tolist() == [1.1, 2.2] * 2
+    assert (table["seen_by"] == 0.7).all()
+    assert (noise_free["n_seen"] == noise_free["n_unique"]).all()
+    assert (noise_free["percentage_seen"] == 100).all()
+    above = noise_free["mean_above"].to_numpy()
+    assert above[0] > above[1] and above[1] >= noise_free["n_unique"].iloc[1]
+
+
+def test_curves_and_counts_are_the_same_without_scales(sets, tmp_path):
+    (tmp_path / "with").mkdir()
+    scales = ["--starts", "1.1", "--scales", str(tmp_path / "scales.csv")]
+    assert match_sweep.main(matching(sets, tmp_path / "with", *scales)) == 0
+    assert match_sweep.main(matching(sets, tmp_path, "--starts")) == 0
+    for name in ("curves.csv", "counts.csv"):
+        assert (tmp_path / name).read_bytes() == (tmp_path / "with" / name).read_bytes()
+
+
+def test_starts_and_scales_go_together(sets, tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        match_sweep.main(matching(sets, tmp_path, "--starts", "1.1"))
+    assert "--starts and --scales go together" in capsys.readouterr().err
+
+
+def cropping(sets, folder, size):
+    return [
+        *("--views", *files(sets, "views"), "--views-digest", *files(sets, "views.sha256")),
+        *("--name", "noise", "--values", *map(str, NOISES), "--size", str(size)),
+        *("--table", str(folder / "pixels.parquet")),
+    ]
+
+
+@pytest.mark.parametrize("size", [16, 15, 1000])
+def test_crops_are_the_middle_of_the_first_views(sets, tmp_path, size):
+    assert crop_views.main(cropping(sets, tmp_path, size)) == 0
+    pixels = read_table(tmp_path / "pixels.parquet")
+    for noise, member in zip(NOISES, sets, strict=True):
+        image = read_view(member / "views", member / "views.sha256").image
+        rows = pixels[pixels["noise"] == noise]
+        assert len(rows) == np.prod(np.minimum(size, image.shape))
+        assert (rows["grey"].to_numpy() == image[rows["y"], rows["x"]]).all()
+        for name, length in zip(("y", "x"), image.shape, strict=True):
+            before, after = rows[name].min(), length - 1 - rows[name].max()
+            assert 0 <= after - before <= 1
+            assert rows[name].nunique() == min(size, length)
+
+
+def test_theory_covers_all_octaves(tmp_path):
+    table = tmp_path / "theory.csv"
+    arguments = ["--camera-blur", "0.8", "--sigma-min", "1.1", "--kappa", KAPPA, "--n-oct", "2"]
+    assert noise_theory.main([*arguments, "--table", str(table)]) == 0
+    theory = read_table(table)
+    assert (theory["sigma"].min(), theory["sigma"].max()) == pytest.approx((1.1, 4.4))
+    octave = theory.set_index(theory["sigma"].round(9))["dog_noise"]
+    ratio = octave[1.1] / octave[2.2]
+    assert theory["octave_ratio"].iloc[0] == pytest.approx(ratio)
