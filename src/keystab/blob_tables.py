@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,16 @@ mirror image beyond the border is then below 1e-9 of the blob."""
 
 _LOWER, _UPPER = 1 / 3, 3.0
 """The extremum of the Laplacian is sought between these multiples of the theoretical scale."""
+
+
+class _Way(NamedTuple):
+    """One way to find the scale of a blob."""
+
+    experiment: str
+    kappa: float
+    n_spo: int
+    detection: str
+    assumed_blur: float
 
 
 def blob_table(
@@ -79,7 +90,7 @@ def blob_table(
     >>> table = blob_table([3.0], kappas=[1.2], n_spo=[3], assumed_blurs=[])
     >>> table.loc[:2, ["operator", "detection", "theory", "detected"]].round(2)
         operator detection  theory  detected
-    0        dog   refined    2.74      2.74
+    0        dog   refined    2.74      2.71
     1  laplacian    series    3.00      3.00
     2        dog  discrete    2.67      2.77
     """
@@ -88,71 +99,64 @@ def blob_table(
     for blob in blobs:
         checks.number("blobs", blob, above=0)
     finest = max(n_spo)
-    limits = {"max_offset": max_offset, "max_iterations": max_iterations}
-    assumptions = sorted({camera_blur, *assumed_blurs})
-
-    def rows() -> Iterator[dict[str, object]]:
-        for blob in map(float, blobs):
-            image, centre = _image(blob, camera_blur)
-
-            def of_dog(
-                experiment: str,
-                ratio: float,
-                n: int,
-                detection: str,
-                assumed: float,
-                blob: float = blob,
-                image: np.ndarray = image,
-                centre: float = centre,
-            ) -> dict[str, object]:
-                theory = float(dog_extremum_scale(blob, ratio, camera_blur, assumed))
-                found = _scale_of_blob(
-                    detect_keypoints(
-                        image,
-                        assumed,
-                        n,
-                        sigma_min=sigma_min,
-                        kappa=ratio,
-                        refine=detection == "refined",
-                        n_oct=_octaves(blob, sigma_min),
-                        **limits,  # type: ignore[arg-type]
-                    ),
-                    centre,
+    right = float(camera_blur)
+    ways = [_Way("operator", ratio, finest, "refined", right) for ratio in kappas]
+    ways += [_Way("operator", 1.0, 0, "series", right)]
+    ways += [
+        _Way("sampling", kappa, n, detection, right)
+        for n in n_spo
+        for detection in ("discrete", "refined")
+    ]
+    ways += [
+        _Way("assumed_blur", kappa, finest, "refined", assumed)
+        for assumed in sorted({right, *assumed_blurs})
+    ]
+    rows = []
+    for blob in map(float, blobs):
+        image, centre = _image(blob, camera_blur)
+        # The same detector takes part in several experiments.
+        scales: dict[_Way, float] = {}
+        for way in ways:
+            series = way.detection == "series"
+            theory = float(
+                laplacian_extremum_scale(blob, right)
+                if series
+                else dog_extremum_scale(blob, way.kappa, right, way.assumed_blur)
+            )
+            same = way._replace(experiment="")
+            if same in scales:
+                pass
+            elif series:
+                scales[same] = laplacian_scale(image, (centre, centre), camera_blur, blob)
+            else:
+                found = detect_keypoints(
+                    image,
+                    way.assumed_blur,
+                    way.n_spo,
+                    sigma_min=sigma_min,
+                    kappa=way.kappa,
+                    refine=way.detection == "refined",
+                    max_offset=max_offset,
+                    max_iterations=max_iterations,
+                    n_oct=_octaves(theory, sigma_min, way.n_spo),
                 )
-                return {
-                    "experiment": experiment,
-                    "operator": "dog",
-                    "kappa": float(ratio),
-                    "n_spo": int(n),
-                    "detection": detection,
+                scales[same] = _scale_of_blob(found, centre)
+            rows.append(
+                {
+                    "experiment": way.experiment,
+                    "operator": "laplacian" if series else "dog",
+                    "kappa": float(way.kappa),
+                    "n_spo": int(way.n_spo),
+                    "detection": way.detection,
                     "blob": blob,
-                    "assumed_blur": float(assumed),
+                    "camera_blur": right,
+                    "assumed_blur": float(way.assumed_blur),
+                    "sigma_min": float(sigma_min),
                     "theory": theory,
-                    "detected": found,
+                    "detected": scales[same],
                 }
-
-            for ratio in kappas:
-                yield of_dog("operator", ratio, finest, "refined", camera_blur)
-            yield {
-                "experiment": "operator",
-                "operator": "laplacian",
-                "kappa": 1.0,
-                "n_spo": 0,
-                "detection": "series",
-                "blob": blob,
-                "assumed_blur": float(camera_blur),
-                "theory": float(laplacian_extremum_scale(blob, camera_blur)),
-                "detected": laplacian_scale(image, (centre, centre), camera_blur, blob),
-            }
-            for n in n_spo:
-                for detection in ("discrete", "refined"):
-                    yield of_dog("sampling", kappa, n, detection, camera_blur)
-            for assumed in assumptions:
-                yield of_dog("assumed_blur", kappa, finest, "refined", assumed)
-
-    table = pd.DataFrame(rows())
-    table.insert(6, "camera_blur", float(camera_blur))
-    table.insert(8, "sigma_min", float(sigma_min))
+            )
+    table = pd.DataFrame(rows)
     table["error"] = table["detected"] / table["theory"] - 1
     return table
 
@@ -213,16 +217,17 @@ def _image(blob: float, camera_blur: float) -> tuple[np.ndarray, float]:
     return blob_image(blob, camera_blur, (2 * half + 1, 2 * half + 1), (half, half)), float(half)
 
 
-def _octaves(blob: float, sigma_min: float) -> int:
-    """Return the number of octaves that surely holds the extremum of a blob, which lies below it.
-
-    A wrong blur moves it up by less than the ``sqrt(2)`` that is added.
-    """
-    return max(1, math.ceil(math.log2(math.sqrt(2) * blob / sigma_min)))
+def _octaves(scale: float, sigma_min: float, n_spo: int) -> int:
+    """Return the number of octaves that hold a scale with one scale step to spare."""
+    if math.isnan(scale):
+        return 1
+    return max(1, math.ceil(math.log2(scale / sigma_min) + 1 / n_spo))
 
 
 def _scale_of_blob(found: pd.DataFrame, centre: float) -> float:
-    """Return the scale of the deepest minimum within 1 px of the centre; NaN where there is none."""
+    """Return the scale of the deepest minimum within 1 px of the centre; NaN if there is none."""
     near = (found[["y", "x"]] - centre).abs().max(axis=1) <= 1.0
     own = found[near & (found["sign"] == -1)]
-    return float(own.loc[own["value"].idxmin(), "sigma"]) if len(own) else math.nan
+    if len(own) == 0:
+        return math.nan
+    return float(own["sigma"].to_numpy()[own["value"].to_numpy().argmin()])

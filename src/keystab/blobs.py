@@ -230,7 +230,7 @@ def dog_extremum_scale(
     >>> float(dog_extremum_scale(2.0, kappa=1.44).round(4))
     1.6667
     >>> dog_extremum_scale([0.8, 2.0], 1.44, camera_blur=0.7, assumed_blur=[0.9, 0.3]).round(4)
-    array([   nan, 1.7401])
+    array([  nan, 1.748])
     """
     scale2 = variance_at_zero(blob, camera_blur, assumed_blur) / _ratio(kappa)
     return _scale(scale2, assumed_blur, camera_blur)
