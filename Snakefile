@@ -19,18 +19,21 @@ include: "workflow/rules/scale_space.smk"  # a view -> a stored scale-space, whe
 include: "workflow/rules/detect.smk"  # a view or its scale-space -> extrema, with refinement traces
 include: "workflow/rules/match.smk"  # extrema of many samplings -> tables
 include: "workflow/rules/compare.smk"  # extrema of many views -> tables
+include: "workflow/rules/theory.smk"  # settings -> tables of what needs no picture
 include: "workflow/rules/figures.smk"  # tables -> figures
 
 
 # Figure -> what it shows -> tables that it draws; the rules are in workflow/rules/figures.smk.
 #
-#   fig1  discrete Gaussian blurs and the semigroup property    fig1.csv
-#   fig2  simulated views                                       fig2.csv, fig2_pixels.parquet
-#   fig3  number of extrema against the sampling                fig3.csv
-#   fig4  extrema that come and go as the sampling gets finer   fig4_*.csv
-#   fig5  features against stability                            fig5_*.csv
-#   fig6  iso-surfaces around stable and unstable keypoints     fig6.csv, fig6_cubes.parquet
-FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6"]
+#   fig1   discrete Gaussian blurs and the semigroup property       fig1.csv
+#   fig2   simulated views                                          fig2.csv, fig2_pixels.parquet
+#   fig3   number of extrema against the sampling                   fig3.csv
+#   fig4   extrema that come and go as the sampling gets finer      fig4_*.csv
+#   fig5   features against stability                               fig5_*.csv
+#   fig6   iso-surfaces around stable and unstable keypoints        fig6.csv, fig6_cubes.parquet
+#   figS3  the Gaussian blur of a real camera                       figS3.csv, figS3_profiles.csv
+#   figS4  scales at which blobs are detected, and theory           figS4.csv
+FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "figS3", "figS4"]
 
 
 rule all:

@@ -35,6 +35,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -442,8 +443,14 @@ class _Spectrum:
         return float((self.weight * self.mean * gaussian).sum())
 
 
-def _unit_nodes(n: int) -> tuple[Array, Array]:
-    """Return nodes and weights of the Gauss-Legendre rule on [0, 1]."""
+def _unit_nodes(least: int) -> tuple[Array, Array]:
+    """Return nodes and weights of the Gauss-Legendre rule on [0, 1], at least so many."""
+    return _rule(least if least < 16 else 32 * math.ceil(least / 32))
+
+
+@lru_cache(maxsize=64)
+def _rule(n: int) -> tuple[Array, Array]:
+    """Return the rule of `n` nodes; making one costs more than using it."""
     nodes, weights = np.polynomial.legendre.leggauss(n)
     return (nodes + 1) / 2, weights / 2
 

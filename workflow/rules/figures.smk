@@ -132,3 +132,40 @@ use rule fig1 as fig6 with:
         module="keystab.figures.fig6",
         code=fingerprint("keystab.figures.fig6"),
         software=SOFTWARE,
+
+
+use rule fig1 as figS3 with:
+    input:
+        f"{RESULTS}/tables/figS3.csv",
+        f"{RESULTS}/tables/figS3_profiles.csv",
+    output:
+        pdf=f"{DRAWN}/figS3.pdf",
+        png=report(f"{DRAWN}/figS3.png", caption="../report/figS3.rst", category="Figures"),
+    log:
+        f"{LOGS}/figS3.log",
+    benchmark:
+        f"{LOGS}/benchmarks/figS3.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.figS3",
+        code=fingerprint("keystab.figures.figS3"),
+        software=SOFTWARE,
+
+
+use rule fig1 as figS4 with:
+    input:
+        f"{RESULTS}/tables/figS4.csv",
+    output:
+        pdf=f"{DRAWN}/figS4.pdf",
+        png=report(f"{DRAWN}/figS4.png", caption="../report/figS4.rst", category="Figures"),
+    log:
+        f"{LOGS}/figS4.log",
+    benchmark:
+        f"{LOGS}/benchmarks/figS4.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.figS4",
+        code=fingerprint("keystab.figures.figS4"),
+        software=SOFTWARE,
