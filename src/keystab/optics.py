@@ -552,7 +552,7 @@ def profile_table(
     pandas.DataFrame
         One row per model and radius: ``model``, ``f_number``, ``pitch``, ``radius`` (pixels),
         ``psf``, the mean over the circle, and ``gaussian``, both per square pixel for a point
-        spread function of integral 1.
+        spread function of integral 1; ``c`` and ``residual`` of the fit, see `GaussianFit`.
     """
     import pandas as pd
 
@@ -573,6 +573,8 @@ def profile_table(
                     "radius": radius,
                     "psf": psf_profile(what, radius * pitch) * pitch**2,
                     "gaussian": gaussian * pitch**2,
+                    "c": fit.blur,
+                    "residual": fit.residual,
                 }
             )
         )

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 TABLES = {
     "figS3.csv": ("model", "pitch", "f_number", "c", "residual"),
-    "figS3_profiles.csv": ("model", "f_number", "pitch", "radius", "psf", "gaussian"),
+    "figS3_profiles.csv": ("model", "f_number", "pitch", "radius", "psf", "gaussian", "c", "residual"),
 }
 """Files read, with the columns that they must have."""
 
 MODELS = {
-    "diffraction": ("a", "d", "diffraction and pixel"),
-    "defocus": ("b", "e", "and out of focus"),
-    "spherical": ("c", "f", "and spherical aberration"),
+    "diffraction": ("a", "d", "perfect lens"),
+    "defocus": ("b", "e", "out of focus"),
+    "spherical": ("c", "f", "spherical aberration"),
 }
 """Letters of the two panels of each lens, and what it is."""
 
@@ -74,14 +74,19 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
             upper, lower, title = MODELS[model]
             style.letter(above, upper, title)
             _draw_blurs(above, _of(blurs, model))
-            style.letter(below, lower, "point spread function")
+            style.letter(below, lower, f"its spread at {_camera(profiles)}")
             _draw_profile(below, _of(profiles, model))
         top[0].set_ylabel("camera blur $c$ (px)")
         bottom[0].set_ylabel("per square pixel")
         _name_pitches(top[0], _of(blurs, "diffraction"))
         _explain(top[1])
-        _name_profiles(bottom[0], _of(profiles, "diffraction"))
+        _name_profiles(bottom[0])
         return style.settle(figure, draft)
+
+
+def _camera(profiles: DataFrame) -> str:
+    """Return the camera that the profiles belong to."""
+    return f"f/{profiles['f_number'].iloc[0]:g}, {profiles['pitch'].iloc[0]:g} µm"
 
 
 def _of(table: DataFrame, model: str) -> DataFrame:
@@ -89,12 +94,13 @@ def _of(table: DataFrame, model: str) -> DataFrame:
     return table[table["model"] == model]
 
 
-def _pitches(rows: DataFrame) -> dict[float, tuple[float, float, float]]:
+def _pitches(rows: DataFrame) -> dict[float, str]:
     """Return the pixel pitches of a table, smallest first, with their colours: light to dark."""
+    from matplotlib.colors import to_hex
+
     pitches = sorted(set(rows["pitch"]))
-    return {
-        pitch: palette.shade(i / max(len(pitches) - 1, 1)) for i, pitch in enumerate(pitches)
-    }
+    shades = np.linspace(0.0, 1.0, max(len(pitches), 2))
+    return {pitch: to_hex(palette.shade(x)) for pitch, x in zip(pitches, shades, strict=False)}
 
 
 def _draw_blurs(ax: Axes, rows: DataFrame) -> None:
@@ -116,7 +122,9 @@ def _draw_blurs(ax: Axes, rows: DataFrame) -> None:
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.set_xlabel("f-number (aperture closes to the right)")
+    ax.set_ylim(top=1.3 * max(rows["c"].max(), PAPER[1]))  # room for words
+    ax.set_xlim(low / 1.08, high * 1.7)  # room for the pixel pitches
+    ax.set_xlabel("f-number (open $\\rightarrow$ closed)")
     style.finish_axes(ax)
 
 
@@ -124,20 +132,19 @@ def _name_pitches(ax: Axes, rows: DataFrame) -> None:
     """Write the pixel pitches beside the lines of the first panel."""
     for pitch, colour in _pitches(rows).items():
         last = rows[rows["pitch"] == pitch].sort_values("f_number").iloc[-1]
-        text = f"{pitch:g} µm"
-        place = {"va": "bottom", "ha": "right"}
         style.direct_label(
-            ax, last["f_number"], last["c"], text, colour, right=-9.0, up=-1.0, **place
+            ax, last["f_number"], last["c"], f"{pitch:g} µm", colour, right=3.0, ha="left"
         )
     place = {"transform": ax.transAxes, "ha": "left", "va": "top", "fontsize": style.SMALL}
-    ax.text(0.03, 0.97, "pixel pitch:", color=palette.INK, **place)
+    ax.text(0.03, 0.97, "pixel pitch at the right", color=palette.GREY, **place)
 
 
 def _explain(ax: Axes) -> None:
     """Say what the band and the thick lines are."""
     place = {"ha": "right", "fontsize": style.SMALL, "color": palette.GREY}
     text = ax.get_yaxis_transform()
-    ax.text(0.98, PAPER[0], "measured in the paper", transform=text, va="bottom", **place)
+    name = f"paper: {PAPER[0]} to {PAPER[1]} px"
+    ax.text(0.98, PAPER[0], name, transform=text, va="bottom", **place)
     ax.text(
         0.98,
         0.97,
@@ -161,20 +168,18 @@ def _draw_profile(ax: Axes, rows: DataFrame) -> None:
     ax.set(xlim=(0.0, radius[-1]), xticks=np.arange(0.0, radius[-1] + 0.01, 0.5))
     ax.set_ylim(0.0, 1.08 * max(rows["psf"].max(), rows["gaussian"].max()))
     ax.set_xlabel("distance from the centre (px)")
+    text = f"$c$ = {rows['c'].iloc[0]:.2f} px\nresidual {100 * rows['residual'].iloc[0]:.0f} %"
+    place = {"transform": ax.transAxes, "ha": "right", "va": "top", "fontsize": style.SMALL}
+    ax.text(0.99, 0.97, text, color=palette.GREY, **place)
     style.finish_axes(ax)
 
 
-def _name_profiles(ax: Axes, rows: DataFrame) -> None:
-    """Name both lines of the first profile, and the camera that all three belong to."""
-    f_number, pitch = rows["f_number"].iloc[0], rows["pitch"].iloc[0]
-    lines = [
-        (f"f/{f_number:g}, pixels of {pitch:g} µm", palette.GREY),
-        ("mean over circles", palette.INK),
-        ("nearest Gaussian", palette.GAUSSIAN_COLOUR),
-    ]
-    for line, (text, colour) in enumerate(lines):
+def _name_profiles(ax: Axes) -> None:
+    """Name both lines of the first profile."""
+    names = {"mean over circles": palette.INK, "nearest Gaussian": palette.GAUSSIAN_COLOUR}
+    for line, (text, colour) in enumerate(names.items()):
         place = {"transform": ax.transAxes, "ha": "right", "va": "top"}
-        ax.text(0.99, 0.97 - 0.15 * line, text, color=colour, fontsize=style.SMALL, **place)
+        ax.text(0.99, 0.55 - 0.13 * line, text, color=colour, fontsize=style.SMALL, **place)
 
 
 if __name__ == "__main__":

@@ -92,12 +92,12 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
 
 
 def _plain_ticks(ax: Axes, low: float, high: float) -> None:
-    """Label whole numbers, or what the logarithmic axis does where there are many or few."""
+    """Label every half pixel where the range is short, and leave it to the axis where it is not."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-    whole = np.arange(np.ceil(low), np.floor(high) + 1)
-    if 2 <= len(whole) <= 6:
-        ax.xaxis.set_major_locator(FixedLocator(whole))
+    halves = np.arange(np.ceil(2 * low), np.floor(2 * high) + 1) / 2
+    if 2 <= len(halves) <= 6:
+        ax.xaxis.set_major_locator(FixedLocator(halves))
         ax.xaxis.set_minor_locator(NullLocator())
         ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
@@ -131,7 +131,7 @@ def _draw_operators(ax: Axes, rows: DataFrame) -> None:
         ax.plot(own["blob"], ratio, color=colour, label=f"{kappa:.6g}", **_marks())
         name = _power(kappa) if operator == "dog" else "normalised Laplacian"
         # The lines of the smallest ratio and of its limit are neighbours: one label on each side.
-        up = -6.0 if 1 < kappa < 1.05 else 6.0
+        up = -9.0 if 1 < kappa < 1.05 else 6.0
         style.direct_label(ax, last, kappa**-0.5, name, colour, up=up)
     blob = np.geomspace(rows["blob"].min(), last, 50)
     first = rows["sigma_min"].iloc[0] / blob
@@ -149,12 +149,12 @@ def _draw_operators(ax: Axes, rows: DataFrame) -> None:
 
 def _draw_errors(ax: Axes, samplings: DataFrame, operators: DataFrame) -> None:
     """Draw the sizes of relative errors; the Laplacian is that of the exact series."""
-    from keystab.figures.style import N_SPO
+    from matplotlib.ticker import NullLocator
 
     names = {"discrete": "on the grid", "refined": "refined"}
     finest = samplings["n_spo"].max()
     groups = [
-        (f"{names[detection]}, {N_SPO} = {n_spo}", palette.DETECTION_COLOURS[detection], n_spo)
+        (f"{names[detection]}, {style.N_SPO} = {n_spo}", palette.DETECTION_COLOURS[detection], n_spo)
         for n_spo in sorted(set(samplings["n_spo"]))
         for detection in names
     ]
@@ -167,8 +167,9 @@ def _draw_errors(ax: Axes, samplings: DataFrame, operators: DataFrame) -> None:
     colour = palette.OPERATOR_COLOURS["laplacian"]
     _draw_size(ax, laplacian, colour, colour, "laplacian", "Laplacian, exact series")
     ax.set_yscale("log")
-    ax.set_ylim(EXACT / 1.5, 60.0)
-    ax.set_yticks([1e-6, 1e-4, 1e-2, 1.0])
+    ax.set_ylim(EXACT / 1.5, 100.0)  # room for the names
+    ax.set_yticks([1e-6, 1e-4, 1e-2])
+    ax.yaxis.set_minor_locator(NullLocator())
     ax.legend(
         loc="upper left",
         bbox_to_anchor=(-0.01, 1.03),
@@ -199,14 +200,23 @@ def _draw_assumptions(ax: Axes, rows: DataFrame) -> None:
         side = "right" if assumed == c else "below" if assumed < c else "above"
         colour = palette.ASSUMED_COLOURS[side]
         theory = _over_right(blob, c, assumed)
-        ax.plot(blob, theory, color=colour, linewidth=1.0, label=f"theory {assumed:g}")
+        ax.plot(blob, theory, color=colour, linewidth=0.8, linestyle=":", label="below")
+        reached = theory * blob / np.sqrt(kappa) >= rows["sigma_min"].iloc[0]
+        label = f"theory {assumed:g}"
+        ax.plot(blob[reached], theory[reached], color=colour, linewidth=1.0, label=label)
         ratio = own["detected"] * np.sqrt(kappa) / own["blob"]
         ax.plot(own["blob"], ratio, color=colour, label=f"{assumed:g}", **_marks())
-        relation = "=" if side == "right" else "<" if side == "below" else ">"
-        text = f"assumed {assumed:g} px" + (" (right)" if side == "right" else f" ({relation} $c$)")
-        up = -9.0 if side == "above" else 8.0
-        end = float(_over_right(blob[-1:], c, assumed)[0])
-        style.direct_label(ax, blob[-1], end, text, colour, up=up)
+        # Beside the curve, on the side where it leaves room: right of a third of it, and for the
+        # right blur, whose curve is level, below its beginning.
+        relation, at, up = {
+            "below": ("< $c$", len(blob) // 3, 6.0),
+            "right": ("right", 0, -8.0),
+            "above": ("> $c$", len(blob) // 3, -8.0),
+        }[side]
+        level = float(theory[at])
+        text = f"assumed {assumed:g} px ({relation})"
+        if np.isfinite(level):
+            style.direct_label(ax, blob[at], level, text, colour, right=4.0, up=up, ha="left")
     seen = rows["detected"] * np.sqrt(kappa) / rows["blob"]
     ax.set_ylim(min(0.75, seen.min() - 0.06), max(1.15, seen.max() + 0.06))
     place = {"transform": ax.transAxes, "ha": "right", "va": "top"}
