@@ -226,5 +226,5 @@ def _check_width(width: float, shape: tuple[int, ...]) -> None:
     if width > min(shape) / 3:
         raise InputError(
             "the picture holds less than 1.5 standard deviations of its bump to each side; give "
-            "more of the point spread function, or its background"
+            "more of the point spread function, or subtract its background"
         )

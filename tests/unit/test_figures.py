@@ -15,7 +15,7 @@ from keystab.figures import style
 from keystab.figures._render import check_tables, main, read_tables, save
 from keystab.tables import write_table
 
-NUMBERS = (1, 2, 3, 4, 5, 6)
+NUMBERS = (1, 2, 3, 4, 5, 6, "S3", "S4")
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,16 @@ def test_text_has_seven_points_or_more_and_nothing_touches_the_edge(n, drawn):
 
 
 @pytest.mark.parametrize(
-    ("n", "letters"), [(1, "abcde"), (2, "abc"), (3, "abcde"), (4, "abcd"), (5, "abcde")]
+    ("n", "letters"),
+    [
+        (1, "abcde"),
+        (2, "abc"),
+        (3, "abcde"),
+        (4, "abcd"),
+        (5, "abcde"),
+        ("S3", "abcdef"),
+        ("S4", "abc"),
+    ],
 )
 def test_panels_carry_their_letters(n, letters, drawn):
     labels = {ax.get_label() for ax in drawn[n].axes}

@@ -8,12 +8,13 @@ import time
 import pytest
 from project import QUICK
 
-FIGURES = {f"fig{n}" for n in range(1, 7)}
+FIGURES = {f"fig{n}" for n in (1, 2, 3, 4, 5, 6, "S3", "S4")}
+BLOBS = {"detect_blobs", "figS4"}
 AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
 MATCHING = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
 DETECTION = {"detect", "detect_stored", "detect_grid", "count_refined"} | MATCHING
 STILL = {"simulate", "scale_space"} | DETECTION
-EVERYTHING = STILL | FIGURES | {"semigroup", "describe_views"}
+EVERYTHING = STILL | FIGURES | BLOBS | {"semigroup", "describe_views", "camera_optics"}
 
 
 def reruns(project) -> set[str]:
@@ -33,7 +34,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
     [
         ("src/keystab/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
         ("src/keystab/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
-        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION),
+        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
         ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"simulate", "describe_views", "fig2", "cut_cubes"} | STILL),
@@ -54,13 +55,15 @@ def test_edits_of_code(finished, name, old, new, expected):
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("refinement: {max_offset: 0.7}", {"count_refined"}),
+        ("refinement: {max_offset: 0.7}", {"count_refined"} | BLOBS),
         ("refinement: {move: unit_step}", {"detect", "detect_stored", "count_refined"} | MATCHING),
         ("comparison: {match_sign: true}", MATCHING),
         ("comparison: {last_scale: 2.0}", MATCHING | {"count_refined"}),
         ("comparison: {scale_ratio: 1.5}", MATCHING),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
+        ("optics: {defocus: 20.0}", {"camera_optics", "figS3"}),
+        ("blobs: {camera_blur: 0.7}", BLOBS),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
         ("draft: false", FIGURES),
         # 1.1 is also the blur and 0.0 also the shift: the set of values stays the same.

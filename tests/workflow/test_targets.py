@@ -10,12 +10,12 @@ import pytest
 from project import ROOT
 
 RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
-FIGURES = [f"fig{n}" for n in range(1, 7)]
+FIGURES = [f"fig{n}" for n in (1, 2, 3, 4, 5, 6, "S3", "S4")]
 
 
 def test_whole_study_at_the_papers_settings(project):
     jobs = project.would_run()
-    assert {"fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "all"} <= jobs.keys()
+    assert {*FIGURES, "all"} <= jobs.keys()
     assert (jobs["detect"], jobs["detect_stored"], jobs["scale_space"]) == (14, 3, 3)
     assert sum(jobs.values()) <= 60  # fat jobs
 
@@ -24,6 +24,8 @@ def test_whole_study_at_the_papers_settings(project):
     ("target", "rules"),
     [
         ("figures/quick/fig1.pdf", {"semigroup", "fig1"}),
+        ("figures/quick/figS3.pdf", {"camera_optics", "figS3"}),
+        ("figures/quick/figS4.png", {"detect_blobs", "figS4"}),
         ("figures/quick/fig2.png", {"simulate", "describe_views", "fig2"}),
         ("figures/quick/fig6.pdf", {"simulate", "scale_space", "detect_stored", "detect", "match_samplings", "cut_cubes", "fig6"}),
     ],
