@@ -65,7 +65,7 @@ def blob_table(
     assumed_blurs : sequence of float
         Blurs for which the detector takes it; the right one is added.
     sigma_min : float, default 1.1
-        First scale in pixels, at least any of the blurs.
+        First scale in pixels, or the largest of the blurs where that is more.
     max_offset, max_iterations
         Of the refinement; see `keystab.detect_keypoints`.
 
@@ -100,6 +100,7 @@ def blob_table(
         checks.number("blobs", blob, above=0)
     finest = max(n_spo)
     right = float(camera_blur)
+    first = max(sigma_min, right, *assumed_blurs)
     ways = [_Way("operator", ratio, finest, "refined", right) for ratio in kappas]
     ways += [_Way("operator", 1.0, 0, "series", right)]
     ways += [
@@ -133,12 +134,12 @@ def blob_table(
                     image,
                     way.assumed_blur,
                     way.n_spo,
-                    sigma_min=sigma_min,
+                    sigma_min=first,
                     kappa=way.kappa,
                     refine=way.detection == "refined",
                     max_offset=max_offset,
                     max_iterations=max_iterations,
-                    n_oct=_octaves(theory, sigma_min, way.n_spo),
+                    n_oct=_octaves(theory, first, way.n_spo),
                 )
                 scales[same] = _scale_of_blob(found, centre)
             rows.append(
@@ -151,7 +152,7 @@ def blob_table(
                     "blob": blob,
                     "camera_blur": right,
                     "assumed_blur": float(way.assumed_blur),
-                    "sigma_min": float(sigma_min),
+                    "sigma_min": float(first),
                     "theory": theory,
                     "detected": scales[same],
                 }

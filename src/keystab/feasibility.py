@@ -101,7 +101,6 @@ def setting_problems(settings: Settings) -> list[str]:
         problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")
     problems += _order(settings["semigroup"], "semigroup", "sigma_from", "sigma_to")
     problems += _order(settings["blobs"], "blobs", "size_from", "size_to")
-    problems += _blobs_blurred_too_much(settings)
     available = settings["samplings"]["n_spo"]
     unknown = [n_spo for n_spo in kept_n_spo(settings) if n_spo not in available]
     if unknown:
@@ -131,17 +130,6 @@ def _scale_below_blur(settings: Settings) -> list[str]:
     return [
         f"detector.sigma_min is {sigma_min}, allowed is at least {blur:g}, the blur that the view "
         "sets.still already has"
-    ]
-
-
-def _blobs_blurred_too_much(settings: Settings) -> list[str]:
-    """One line for every blur of the blobs at which no scale-space can begin."""
-    sigma_min, blobs = settings["detector"]["sigma_min"], settings["blobs"]
-    largest = {"camera_blur": blobs["camera_blur"], "assumed_blurs": max(blobs["assumed_blurs"])}
-    return [
-        f"blobs.{name} has {blur:g}, allowed is at most detector.sigma_min = {sigma_min:g}"
-        for name, blur in largest.items()
-        if blur > sigma_min
     ]
 
 

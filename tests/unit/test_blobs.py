@@ -138,6 +138,12 @@ def test_blobs_below_the_first_scale_are_not_found():
     assert dogs["detected"].isna().all() and dogs["theory"].notna().all()
 
 
+def test_scales_begin_at_the_largest_blur():
+    table = blob_table([3.0], kappas=[1.2], n_spo=[6], assumed_blurs=[1.3], sigma_min=1.0)
+    assert (table["sigma_min"] == 1.3).all()
+    assert table["error"].abs().max() < 0.1
+
+
 def test_no_laplacian_extremum_at_an_end_of_the_range():
     image = blob_image(2.0, 0.8, (41, 41), (20.0, 20.0))
     assert np.isnan(laplacian_scale(image, (20.0, 20.0), 0.8, near=0.4))
@@ -156,7 +162,7 @@ def test_no_laplacian_extremum_at_an_end_of_the_range():
         (lambda: blob_image(2.0, 0.8, (0, 4), (0, 0)), "height is 0"),
         (lambda: blob_table([]), "blobs: none were given"),
         (lambda: blob_table([2.0, 0.0]), "blobs is 0.0"),
-        (lambda: blob_table([2.0], camera_blur=1.2), "sigma_min is 1.1"),
+        (lambda: blob_table([2.0], sigma_min=-1.0, camera_blur=-1.0), "camera_blur is -1"),
     ],
 )
 def test_wrong_arguments_are_named(call, words):
