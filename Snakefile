@@ -20,6 +20,7 @@ include: "workflow/rules/detect.smk"  # a view or its scale-space -> extrema, wi
 include: "workflow/rules/match.smk"  # extrema of many samplings -> tables
 include: "workflow/rules/compare.smk"  # extrema of many views -> tables
 include: "workflow/rules/floor.smk"  # views -> extrema in variants of the arithmetic -> tables
+include: "workflow/rules/theory.smk"  # settings -> tables of what needs no picture
 include: "workflow/rules/figures.smk"  # tables -> figures
 
 

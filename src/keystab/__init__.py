@@ -24,6 +24,7 @@ _HOME = {
     "InputError": "errors",
     "balanced_delta": "sampling",
     "detect_keypoints": "detection",
+    "fit_psf": "psf",
     "occurrence": "matching",
     "open_scale_space": "stores",
     "open_views": "stores",

@@ -1,4 +1,4 @@
-"""The command `keystab`: simulate a view, detect keypoints, look into a file.
+"""The command `keystab`: simulate a view, detect keypoints, measure a blur, look into a file.
 
 Bad input ends with status 2 and one line on standard error.
 """
@@ -125,6 +125,28 @@ def detect(args: argparse.Namespace) -> None:
     print(f"{args.picture}: {found} in {seconds:.1f} s", file=sys.stderr)
 
 
+def blur(args: argparse.Namespace) -> None:
+    """Fit a Gaussian to the picture of a point spread function and say how wide it is."""
+    from keystab.pictures import read_picture
+    from keystab.psf import border_level, fit_psf
+
+    picture = read_picture(args.picture)
+    try:
+        background = border_level(picture) if args.background == "border" else args.background
+        fit = fit_psf(picture, args.oversampling, background)
+    except InputError as error:
+        raise InputError(f"{args.picture}: {error}") from None
+    print(
+        f"camera blur c    {fit.blur:.4g} pixels\n"
+        f"centre           y {fit.y:.2f}, x {fit.x:.2f} in the picture's samples\n"
+        f"principal axes   {fit.major:.4g} and {fit.minor:.4g} pixels, "
+        f"the longer at {math.degrees(fit.angle):.0f} degrees from x towards y\n"
+        f"residual         {fit.residual:.1%} of the picture's root mean square; "
+        f"{fit.general_residual:.1%} with two axes\n"
+        f"background       {background:.4g}"
+    )
+
+
 def inspect(args: argparse.Namespace) -> None:
     """Say in words what a store or a table holds."""
     from keystab.inspection import describe
@@ -158,6 +180,15 @@ def _parser() -> argparse.ArgumentParser:
             description="Detect the extrema of the difference-of-Gaussians scale-space of a "
             "picture, without any filter of contrast or edges.",
             formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        )
+    )
+    _blur_arguments(
+        commands.add_parser(
+            "blur",
+            help="fit a Gaussian to a picture of a point spread function",
+            description="Say what camera blur a measured point spread function has: the standard "
+            "deviation of the Gaussian that fits its picture best in least squares, for "
+            "--camera-blur of keystab detect.",
         )
     )
     to = commands.add_parser(
@@ -261,6 +292,32 @@ def _detect_arguments(to: argparse.ArgumentParser) -> None:
         to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
     ]  # fmt: skip
     to.set_defaults(parameters=[flag.dest for flag in flags], output=None)
+
+
+def _blur_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=blur)
+    to.add_argument(
+        "picture", metavar="PSF", type=Path,
+        help="PNG, TIFF, JPEG or npy whose values are proportional to light (no gamma)",
+    )  # fmt: skip
+    to.add_argument(
+        "--oversampling", type=float, default=1.0, metavar="K",
+        help="samples of the picture per pixel of the camera",
+    )  # fmt: skip
+    to.add_argument(
+        "--background", type=_background, default=0.0, metavar="B",
+        help="level to subtract first, in units of the picture (PNG: 0 to 1), or border for the "
+        "median of its outermost samples; 0 if not given",
+    )  # fmt: skip
+
+
+def _background(text: str) -> float | str:
+    if text == "border":
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no level; give a number or border") from None
 
 
 def _seed(text: str) -> int | str:

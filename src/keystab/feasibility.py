@@ -106,6 +106,7 @@ def setting_problems(settings: Settings) -> list[str]:
     if settings["comparison"]["last_scale"] is not None:
         problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")
     problems += _order(settings["semigroup"], "semigroup", "sigma_from", "sigma_to")
+    problems += _order(settings["blobs"], "blobs", "size_from", "size_to")
     available = settings["samplings"]["n_spo"]
     unknown = [n_spo for n_spo in kept_n_spo(settings) if n_spo not in available]
     if unknown:

@@ -15,6 +15,7 @@ from keystab.camera import simulate_view
 from keystab.detection import detect_keypoints
 from keystab.extrema import bytes_of_search
 from keystab.pictures import read_picture, write_picture
+from keystab.psf import fit_psf
 from keystab.tables import read_table
 
 
@@ -141,6 +142,10 @@ BLUR = "--camera-blur 0.8"
         ("simulate PICTURE view.png --blur 1 --step 2 --noise 0.1", "seed"),
         ("simulate PICTURE PICTURE/view.png --blur 1 --step 2", "blob.npy is no folder"),
         (f"detect PICTURE {BLUR} -o PICTURE/found.csv", "blob.npy is no folder"),
+        ("blur gone.png", "gone.png: no such file"),
+        ("blur PICTURE --background dark", "'dark' is no level; give a number or border"),
+        ("blur PICTURE --background 2", "nothing in the picture lies above the background"),
+        ("blur PICTURE --oversampling 0", "oversampling is 0"),
         ("inspect gone", "gone: no such file"),
         ("inspect PICTURE", "ends in .csv or .parquet"),
         ("inspect .", "no store of keystab here"),
@@ -177,6 +182,37 @@ def test_a_folder_in_the_place_of_the_output_survives(
     assert "is a folder; give a file name\n" in capsys.readouterr().err
     for name in ("folder.csv", "folder.npy"):
         assert (tmp_path / name / "precious").read_text() == "kept"
+
+
+def test_blur_says_what_the_library_says(tmp_path, capsys):
+    y, x = np.mgrid[:41, :45]
+    along, across = (x - 22.4 + y - 19.7) / 2**0.5, (x - 22.4 - y + 19.7) / 2**0.5
+    psf = 0.5 * np.exp(-0.5 * ((along / 4.0) ** 2 + (across / 3.0) ** 2)) + 0.1
+    write_picture(psf, tmp_path / "psf.png")
+    for background in ("border", "0.1"):
+        flags = ["--oversampling", "4", "--background", background]
+        assert cli.main(["blur", str(tmp_path / "psf.png"), *flags]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        # The nearest isotropic Gaussian has the geometric mean of both axes.
+        assert lines[0] == "camera blur c    0.866 pixels"
+        assert lines[1] == "centre           y 19.70, x 22.40 in the picture's samples"
+        axes = "1 and 0.75 pixels, the longer at 45 degrees from x towards y"
+        assert lines[2] == f"principal axes   {axes}"
+        fit = fit_psf(read_picture(tmp_path / "psf.png"), 4.0, 0.1)
+        assert lines[3].startswith(f"residual         {fit.residual:.1%} of")
+        assert lines[4] == "background       0.1"
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [(np.full((9, 9), 0.3), "picture is constant"), (np.full((9, 9), np.nan), "NaN or infinite")],
+)
+def test_blur_names_the_picture_that_it_cannot_fit(tmp_path, capsys, values, words):
+    np.save(tmp_path / "psf.npy", values)
+    assert cli.main(["blur", str(tmp_path / "psf.npy")]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1
+    assert "psf.npy: " in err and words in err
 
 
 def test_one_keypoint_is_singular(picture, tmp_path, monkeypatch, capsys):

@@ -43,6 +43,7 @@ def test_shipped_settings_are_feasible(path):
         ([("sets.examples.step", [20, 14])], "sets.examples has lists of different lengths (blur 3, step 2)"),
         ([("comparison.unstable_below", 0.9)], "comparison.unstable_below is 0.9, allowed is a number below comparison.stable_above = 0.8"),
         ([("comparison.last_scale", 1.2)], "comparison.first_scale is 1.2599210498948732, allowed is a number below comparison.last_scale = 1.2"),
+        ([("blobs.size_to", 1.0)], "blobs.size_from is 1.2, allowed is a number below blobs.size_to = 1.0"),
         ([("semigroup.sigma_to", 0.05)], "semigroup.sigma_from is 0.1, allowed is a number below semigroup.sigma_to = 0.05"),
         ([("keep_scale_spaces", [3, 40])], "keep_scale_spaces has 40, allowed are members of samplings.n_spo = [3, 4,"),
         ([("figures", "empty")], "results, figures and logs name the same folder"),

@@ -102,6 +102,8 @@ def test_text_has_seven_points_or_more_and_nothing_touches_the_edge(n, drawn):
         (12, "abcdef"),
         ("S1", "abc"),
         ("S2", "ab"),
+        ("S3", "abcdef"),
+        ("S4", "abc"),
     ],
 )
 def test_panels_carry_their_letters(n, letters, drawn):

@@ -23,6 +23,8 @@ from keystab.figures import (
     fig11,
     fig12,
     figs2,
+    figs3,
+    figs4,
     palette,
 )
 from keystab.figures.style import spread
@@ -625,3 +627,84 @@ def test_labels_keep_their_distance_order_and_bounds(seed):
     assert places.min() >= 0 and places.max() <= 1 + 1e-12
     apart = np.linspace(0.05, 0.95, 9)
     assert_allclose(spread(apart, 0.1, 0.0, 1.0), apart)  # nothing to do
+
+
+def test_figure_s3_draws_blurs_and_profiles():
+    tables, figure = drawn("S3")
+    for model, (above, below, _) in figs3.MODELS.items():
+        rows = tables["figS3"].query("model == @model")
+        for pitch in (4.5, 6.5):
+            own = rows[rows["pitch"] == pitch]
+            assert_array_equal(line(panel(figure, above), f"{pitch:g}"), own[["f_number", "c"]].T)
+            # Thick where c rises as the aperture opens, up to the minimum.
+            f_number, c = line(panel(figure, above), f"rising {pitch:g}")
+            assert c[-1] == own["c"].min()
+            assert (np.diff(c) < 0).all() and f_number[0] == own["f_number"].min()
+            assert (len(c) == 1) == (model == "diffraction")
+        (band,) = [patch for patch in panel(figure, above).patches if patch.get_label() == "paper"]
+        assert_allclose(
+            band.get_extents().transformed(panel(figure, above).transData.inverted()).intervaly,
+            figs3.PAPER,
+        )
+        profile = tables["figS3_profiles"].query("model == @model")
+        for column in ("psf", "gaussian"):
+            assert_array_equal(line(panel(figure, below), column), profile[["radius", column]].T)
+        (said,) = [
+            text.get_text() for text in panel(figure, below).texts if "residual" in text.get_text()
+        ]
+        assert (
+            said
+            == f"$c$ = {profile['c'].iloc[0]:.2f} px\nresidual {100 * profile['residual'].iloc[0]:.0f} %"
+        )
+
+
+def test_figure_s3_names_a_missing_lens():
+    tables = figure_tables.figs3()
+    for name in tables:
+        wrong = tables | {name: tables[name].query("model != 'spherical'")}
+        with pytest.raises(InputError, match=f"{name}.csv: has no rows of the model spherical"):
+            figs3.draw(wrong)
+
+
+def test_figure_s4_draws_scales_errors_and_theory():
+    tables, figure = drawn("S4")
+    table = tables["figS4"]
+    for kappa in (1.0, 1.1, figure_tables.KAPPA):
+        own = table.query("experiment == 'operator' and kappa == @kappa")
+        assert_array_equal(
+            line(panel(figure, "a"), f"{kappa:.6g}")[1], own["detected"] / own["blob"]
+        )
+        assert set(line(panel(figure, "a"), f"theory {kappa:.6g}")[1]) == {kappa**-0.5}
+    for detection in ("discrete", "refined"):
+        for n_spo in (3, 15):
+            own = table.query(
+                "experiment == 'sampling' and detection == @detection and n_spo == @n_spo"
+            )
+            (found,) = [
+                x for x in panel(figure, "b").get_lines() if x.get_gid() == f"{detection} {n_spo}"
+            ]
+            assert_array_equal(found.get_ydata(), own["error"].abs())
+    (exact,) = [x for x in panel(figure, "b").get_lines() if x.get_gid() == "laplacian"]
+    assert_array_equal(exact.get_ydata(), figs4.EXACT)
+    for assumed in (0.5, 0.8, 1.1):
+        own = table.query("experiment == 'assumed_blur' and assumed_blur == @assumed")
+        ratio = own["detected"] * np.sqrt(figure_tables.KAPPA) / own["blob"]
+        assert_array_equal(line(panel(figure, "c"), f"{assumed:g}")[1], ratio)
+        blob, theory = line(panel(figure, "c"), f"theory {assumed:g}")
+        assert_allclose(theory, np.sqrt(1 + (0.64 - assumed**2) / blob**2))
+        # Drawn in full only where the scale-space holds it.
+        assert (theory * blob / np.sqrt(figure_tables.KAPPA) >= 1.1).all()
+
+
+def test_figure_s4_names_what_it_cannot_draw():
+    table = figure_tables.figs4()["figS4"]
+    with pytest.raises(InputError, match="no rows of the experiment sampling"):
+        figs4.draw({"figS4": table.query("experiment != 'sampling'")})
+    with pytest.raises(InputError, match="no blob of the experiment operator was detected"):
+        figs4.draw(
+            {
+                "figS4": table.assign(
+                    detected=table["detected"].where(table["experiment"] != "operator")
+                )
+            }
+        )

@@ -14,6 +14,7 @@ SAMPLINGS = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
 VIEWS = {"match_views", "match_shipped", "fig7", "fig8", "figS1"}
 SWEEPS = {"match_sweep", "match_blurs", "fig10", "fig11", "fig12", "figS2"}
 KAPPAS = {"match_kappas", "fig9"}
+BLOBS = {"detect_blobs", "figS4"}
 VARIANTS = {"match_variants", "floor"}
 MATCHING = SAMPLINGS | VIEWS | SWEEPS | KAPPAS | VARIANTS
 ONE_VIEW = {"detect", "detect_stored", "detect_grid", "count_refined"} | SAMPLINGS
@@ -22,7 +23,7 @@ STILL = (
     {"simulate", "scale_space", "detect_kappas", "detect_variant"} | ONE_VIEW | KAPPAS | VARIANTS
 )
 SIMULATION = STILL | DETECTION | {"describe_views", "crop_views", "fig2"}
-THEORY = {"semigroup", "noise_theory"}
+THEORY = {"semigroup", "noise_theory", "camera_optics"} | BLOBS
 EVERYTHING = SIMULATION | FIGURES | THEORY
 
 
@@ -43,7 +44,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
     [
         ("src/keystab/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
         ("src/keystab/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
-        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION),
+        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
         ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", SIMULATION),
@@ -64,7 +65,7 @@ def test_edits_of_code(finished, name, old, new, expected):
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS),
+        ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS | BLOBS),
         ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "detect_variant"} - VARIANTS),
         ("comparison: {match_sign: true}", MATCHING),
         ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS | SWEEPS | VARIANTS),
@@ -74,6 +75,8 @@ def test_edits_of_code(finished, name, old, new, expected):
         ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
+        ("optics: {defocus: 20.0}", {"camera_optics", "figS3"}),
+        ("blobs: {camera_blur: 0.7}", BLOBS),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
         ("stability: {n_resamples: 200}", VIEWS),
         ("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7"}),

@@ -24,6 +24,8 @@ def test_whole_study_at_the_papers_settings(project):
     ("target", "rules"),
     [
         ("figures/quick/fig1.pdf", {"semigroup", "fig1"}),
+        ("figures/quick/figS3.pdf", {"camera_optics", "figS3"}),
+        ("figures/quick/figS4.png", {"detect_blobs", "figS4"}),
         ("figures/quick/fig2.png", {"simulate", "describe_views", "fig2"}),
         ("figures/quick/fig12.pdf", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12"}),
         ("figures/quick/figS2.pdf", {"simulate", "detect_views", "match_blurs", "figS2"}),

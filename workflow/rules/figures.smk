@@ -304,8 +304,8 @@ use rule fig1 as figS3 with:
     params:
         tables=folder_of_inputs,
         draft=DRAFT,
-        module="keystab.figures.figS3",
-        code=fingerprint("keystab.figures.figS3"),
+        module="keystab.figures.figs3",
+        code=fingerprint("keystab.figures.figs3"),
         software=SOFTWARE,
 
 
@@ -322,8 +322,8 @@ use rule fig1 as figS4 with:
     params:
         tables=folder_of_inputs,
         draft=DRAFT,
-        module="keystab.figures.figS4",
-        code=fingerprint("keystab.figures.figS4"),
+        module="keystab.figures.figs4",
+        code=fingerprint("keystab.figures.figs4"),
         software=SOFTWARE,
 
 

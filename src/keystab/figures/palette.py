@@ -78,6 +78,30 @@ CONDITION_COLOUR = "#A8216B"
 """The condition number of the Hessian along the balanced curve: a shade of its heat map."""
 
 
+GAUSSIAN_COLOUR = "#D55E00"
+"""A Gaussian beside what it is fitted to (figure S3)."""
+
+OPERATOR_COLOURS = {"dog": "#0072B2", "laplacian": "#009E73"}
+"""Differences of Gaussians, and their limit (figure S4)."""
+
+ASSUMED_COLOURS = {"below": "#D55E00", "right": INK, "above": "#0072B2"}
+"""An assumed blur below, equal to and above that of the camera (figure S4)."""
+
+
+def shade(share: float) -> tuple[float, float, float]:
+    """Return the colour of an ordered quantity: light at 0, dark at 1.
+
+    Examples
+    --------
+    >>> sum(shade(0.0)) > sum(shade(0.5)) > sum(shade(1.0))
+    True
+    """
+    import seaborn
+
+    red, green, blue = seaborn.color_palette("mako_r", as_cmap=True)(0.2 + 0.7 * share)[:3]
+    return red, green, blue
+
+
 def n_spo_colour(n_spo: int, lowest: int = 3, highest: int = 19) -> tuple[float, float, float]:
     """Return the colour of a sampling: light for few scales per octave, dark for many.
 
@@ -93,11 +117,7 @@ def n_spo_colour(n_spo: int, lowest: int = 3, highest: int = 19) -> tuple[float,
     >>> n_spo_colour(2) == n_spo_colour(3) != n_spo_colour(15)
     True
     """
-    import seaborn
-
-    share = min(max((n_spo - lowest) / (highest - lowest), 0.0), 1.0)
-    red, green, blue = seaborn.color_palette("mako_r", as_cmap=True)(0.2 + 0.7 * share)[:3]
-    return red, green, blue
+    return shade(min(max((n_spo - lowest) / (highest - lowest), 0.0), 1.0))
 
 
 def offset_colour(max_offset: float) -> tuple[float, float, float]:

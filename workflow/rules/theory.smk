@@ -1,0 +1,88 @@
+"""What theory says of cameras and of blobs, without any picture (sections 2.3, 3.2 and 4).
+
+Comes in: settings. Goes out: {results}/tables/figS3*.csv and figS4.csv. Steps: the point spread
+functions of model cameras and the Gaussians nearest to them; Gaussian blobs of many sizes, the
+scales at which they are detected, and those that closed forms predict.
+"""
+
+
+rule camera_optics:
+    """Figure S3: the Gaussian blur that stands for a lens and its pixels."""
+    output:
+        table=f"{RESULTS}/tables/figS3.csv",
+        profiles=f"{RESULTS}/tables/figS3_profiles.csv",
+    log:
+        f"{LOGS}/camera_optics.log",
+    benchmark:
+        f"{LOGS}/benchmarks/camera_optics.tsv"
+    params:
+        f_numbers=setting("optics.f_numbers"),
+        pixel_pitches=setting("optics.pixel_pitches"),
+        wavelength=setting("optics.wavelength"),
+        fill_factor=setting("optics.fill_factor"),
+        defocus=setting("optics.defocus"),
+        spherical=setting("optics.spherical"),
+        profile_f_number=setting("optics.profile_f_number"),
+        profile_pitch=setting("optics.profile_pitch"),
+        code=fingerprint("keystab.stages.camera_optics"),
+        software=SOFTWARE,
+    message:
+        "Fitting Gaussians to the blur of cameras with pixels of {params.pixel_pitches} um"
+    shell:
+        """
+        python -m keystab.stages.camera_optics \
+            --f-numbers {params.f_numbers} \
+            --pixel-pitches {params.pixel_pitches} \
+            --wavelength {params.wavelength} \
+            --fill-factor {params.fill_factor} \
+            --defocus {params.defocus} \
+            --spherical {params.spherical} \
+            --profile-f-number {params.profile_f_number} \
+            --profile-pitch {params.profile_pitch} \
+            --table {output.table:q} \
+            --profiles {output.profiles:q} \
+            >{log:q} 2>&1
+        """
+
+
+rule detect_blobs:
+    """Figure S4: the scales at which blobs are detected, and those that theory says."""
+    output:
+        table=f"{RESULTS}/tables/figS4.csv",
+    log:
+        f"{LOGS}/detect_blobs.log",
+    benchmark:
+        f"{LOGS}/benchmarks/detect_blobs.tsv"
+    params:
+        size_from=setting("blobs.size_from"),
+        size_to=setting("blobs.size_to"),
+        size_count=setting("blobs.size_count"),
+        kappas=setting("blobs.kappas"),
+        n_spo=setting("blobs.n_spo"),
+        camera_blur=setting("blobs.camera_blur"),
+        assumed_blurs=setting("blobs.assumed_blurs"),
+        sigma_min=setting("detector.sigma_min"),
+        kappa=setting("detector.kappa"),
+        max_offset=setting("refinement.max_offset"),
+        max_iterations=setting("refinement.max_iterations"),
+        code=fingerprint("keystab.stages.detect_blobs"),
+        software=SOFTWARE,
+    message:
+        "Detecting blobs of {params.size_from} to {params.size_to} px at n_spo = {params.n_spo}"
+    shell:
+        """
+        python -m keystab.stages.detect_blobs \
+            --size-from {params.size_from} \
+            --size-to {params.size_to} \
+            --size-count {params.size_count} \
+            --kappas {params.kappas} \
+            --n-spo {params.n_spo} \
+            --camera-blur {params.camera_blur} \
+            --assumed-blurs {params.assumed_blurs} \
+            --sigma-min {params.sigma_min} \
+            --kappa {params.kappa} \
+            --max-offset {params.max_offset} \
+            --max-iterations {params.max_iterations} \
+            --table {output.table:q} \
+            >{log:q} 2>&1
+        """
