@@ -30,6 +30,7 @@ _HOME = {
     "read_picture": "pictures",
     "scale_space": "dog_space",
     "simulate_view": "camera",
+    "true_extrema": "truth",
     "unique_keypoints": "matching",
 }
 
