@@ -119,7 +119,11 @@ class DogSeries:
         return math.sqrt(power - self.coefficients[0, 0] ** 2)
 
     def jets(
-        self, sigma: NDArray[np.float64], y: NDArray[np.float64], x: NDArray[np.float64]
+        self,
+        sigma: NDArray[np.float64],
+        y: NDArray[np.float64],
+        x: NDArray[np.float64],
+        within_slices: bool = False,
     ) -> Jets:
         """Value, gradient and Hessian at scattered points, by the full sums.
 
@@ -127,6 +131,8 @@ class DogSeries:
         ----------
         sigma, y, x : ndarray, shape (n,)
             Scales above 0 and positions in pixels; positions may lie anywhere.
+        within_slices : bool
+            Leave out the derivatives along scale, which are then 0: half the cost.
 
         Returns
         -------
@@ -150,7 +156,7 @@ class DogSeries:
         order = np.argsort(sigma, kind="stable")
         for start in range(0, n, size):
             rows = order[start : start + size]
-            jets.put(rows, self._block(sigma[rows], y[rows], x[rows]))
+            jets.put(rows, self._block(sigma[rows], y[rows], x[rows], within_slices))
         return jets
 
     def grid(
@@ -158,11 +164,12 @@ class DogSeries:
     ) -> NDArray[np.float64]:
         """Values at one scale on a grid of rows and columns, shape (len(y), len(x))."""
         values = np.zeros((len(y), len(x)))
+        bases = self._bases(y, x, self._counts(sigma**2 - self.blur**2))
         for weight, ratio in ((1.0, self.kappa), (-1.0, 1.0)):
             variance = np.atleast_1d((ratio * sigma) ** 2 - self.blur**2)
             rows, columns = (
                 basis[0][:, : gains.shape[1]] * gains
-                for basis, gains in zip(self._bases(y, x), self._gains(variance), strict=True)
+                for basis, gains in zip(bases, self._gains(variance), strict=True)
             )
             values += weight * (
                 rows @ self.coefficients[: rows.shape[1], : columns.shape[1]] @ columns.T
@@ -170,17 +177,24 @@ class DogSeries:
         return values
 
     def _block(
-        self, sigma: NDArray[np.float64], y: NDArray[np.float64], x: NDArray[np.float64]
+        self,
+        sigma: NDArray[np.float64],
+        y: NDArray[np.float64],
+        x: NDArray[np.float64],
+        within_slices: bool,
     ) -> Jets:
         w: dict[tuple[int, int], NDArray[np.float64]] = dict.fromkeys(_SECOND, np.zeros(1))
         first = second = np.zeros(sigma.size)
         along = np.zeros((sigma.size, 2))
-        bases = self._bases(y, x)
+        # Of the two Gaussians the narrower one keeps more frequencies.
+        bases = self._bases(y, x, self._counts(float(sigma.min()) ** 2 - self.blur**2))
         for weight, ratio in ((1.0, self.kappa), (-1.0, 1.0)):
             s2 = (ratio * sigma) ** 2
-            v = self._derivatives(s2 - self.blur**2, bases)
+            v = self._derivatives(s2 - self.blur**2, bases, _SECOND if within_slices else _FOURTH)
             for pair in _SECOND:
                 w[pair] = w[pair] + weight * v[pair]
+            if within_slices:
+                continue
             first = first + weight * s2 * (v[2, 0] + v[0, 2])
             second = second + weight * s2**2 * (v[4, 0] + 2 * v[2, 2] + v[0, 4])
             along[:, 0] += weight * s2 * (v[3, 0] + v[1, 2])
@@ -194,39 +208,47 @@ class DogSeries:
         hessian[:, 1, 2] = hessian[:, 2, 1] = sigma**2 * w[1, 1]
         return Jets(w[0, 0], gradient, hessian)
 
+    def _counts(self, variance: float) -> list[int]:
+        """Frequencies of both axes that are held and that count after a Gaussian blur."""
+        blur = math.sqrt(max(variance, 0.0))
+        return [
+            min(held, cosine.significant(n, blur))
+            for n, held in zip(self.shape, self.coefficients.shape, strict=True)
+        ]
+
     def _bases(
-        self, y: NDArray[np.float64], x: NDArray[np.float64]
+        self, y: NDArray[np.float64], x: NDArray[np.float64], counts: list[int]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Cosines of both axes and their first derivatives, each of shape (n, K) or (n, L)."""
         return [
             (cosine.basis(p, n, count), cosine.basis(p, n, count, derivative=1))
-            for p, n, count in zip((y, x), self.shape, self.coefficients.shape, strict=True)
+            for p, n, count in zip((y, x), self.shape, counts, strict=True)
         ]
 
     def _gains(self, variance: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Factors of both axes of the frequencies that count for some of the variances."""
-        blur = math.sqrt(max(float(variance.min()), 0.0))
         gains = []
-        for n, held in zip(self.shape, self.coefficients.shape, strict=True):
-            f = np.pi / n * np.arange(min(held, cosine.significant(n, blur)))
-            gains.append(np.exp(-0.5 * variance[:, None] * f**2))
+        for n, count in zip(self.shape, self._counts(float(variance.min())), strict=True):
+            gains.append(np.exp(-0.5 * variance[:, None] * (np.pi / n * np.arange(count)) ** 2))
         return gains
 
     def _derivatives(
         self,
         variance: NDArray[np.float64],
         bases: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+        pairs: tuple[tuple[int, int], ...],
     ) -> dict[tuple[int, int], NDArray[np.float64]]:
-        """Derivatives, up to the fourth, of the image blurred by `variance` at a block of points."""
+        """Derivatives of the image blurred by `variance`, at a block of points."""
+        highest = max(p for p, _ in pairs)
         rows, columns = (
-            _orders(gains, cosines, slopes, n)
+            _orders(gains, cosines, slopes, n, highest)
             for gains, (cosines, slopes), n in zip(
                 self._gains(variance), bases, self.shape, strict=True
             )
         )
         a = self.coefficients[: rows.shape[2], : columns.shape[2]]
-        products = (rows.reshape(-1, rows.shape[2]) @ a).reshape(5, variance.size, -1)
-        return {(p, q): np.einsum("nl,nl->n", products[p], columns[q]) for p, q in _FOURTH}
+        products = (rows.reshape(-1, rows.shape[2]) @ a).reshape(highest + 1, variance.size, -1)
+        return {(p, q): np.einsum("nl,nl->n", products[p], columns[q]) for p, q in pairs}
 
 
 def _orders(
@@ -234,13 +256,14 @@ def _orders(
     cosines: NDArray[np.float64],
     slopes: NDArray[np.float64],
     n: int,
+    highest: int,
 ) -> NDArray[np.float64]:
-    """Blurred cosines of one axis and their first four derivatives, shape (5, points, count)."""
+    """Blurred cosines of one axis and their derivatives, shape (highest + 1, points, count)."""
     count = gains.shape[1]
     curvature = -((np.pi / n * np.arange(count)) ** 2)
-    rows = np.empty((5, *gains.shape))
+    rows = np.empty((highest + 1, *gains.shape))
     np.multiply(gains, cosines[:, :count], out=rows[0])
     np.multiply(gains, slopes[:, :count], out=rows[1])
-    for order in (2, 3, 4):
+    for order in range(2, highest + 1):
         np.multiply(rows[order - 2], curvature, out=rows[order])
     return rows

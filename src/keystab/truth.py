@@ -45,7 +45,7 @@ _FLAT = 1e-10
 
 #: Seeds are sought, and climbs may go, beyond the range of scales by these factors, so that what
 #: lies at its ends is found. No image is sampled below its own blur, but sums may go there.
-_SEEDS_BEYOND = 2**0.25
+SEEDS_BEYOND = 2**0.25
 _CLIMBS_BEYOND = 2**0.4
 _BELOW_BLUR = 0.92
 
@@ -175,13 +175,14 @@ def true_extrema(
     """
     array = checked_image(image)
     check_scales(camera_blur, sigma_min, sigma_max, kappa)
-    samplings = _samplings(n_spo)
+    samplings = listed(n_spo)
     series = DogSeries.of_image(array, float(camera_blur), float(kappa))
-    low = max(sigma_min / _SEEDS_BEYOND, camera_blur)
-    high = sigma_max * _SEEDS_BEYOND
+    low = max(sigma_min / SEEDS_BEYOND, camera_blur)
+    high = sigma_max * SEEDS_BEYOND
     spaces = [octave_of(array, camera_blur, n, low, high, kappa, "cosine") for n in samplings]
     seeds = joined([seeds_of(space, threads) for space in spaces])
-    seeds = joined([seeds, seeds_of_first_slice(spaces[int(np.argmax(samplings))], series)])
+    first = seeds_of_first_slice(spaces[int(np.argmax(samplings))])
+    seeds = joined([seeds, growing(series, first)])
     found = extrema_from(series, seeds, sigma_min, sigma_max)
     height, width = series.shape
     inside = found["y"].between(0, height - 1) & found["x"].between(0, width - 1)
@@ -216,26 +217,28 @@ def seeds_of(space: ScaleSpace, threads: int = 1) -> Seeds:
     return Seeds(space.sigma[s], space.y[row], space.x[column], sign.astype(np.float64))
 
 
-def seeds_of_first_slice(space: ScaleSpace, series: DogSeries) -> Seeds:
-    r"""Seeds for the extrema between the first slice and the second.
+def seeds_of_first_slice(space: ScaleSpace) -> Seeds:
+    """Seeds for the extrema between the first slice and the second.
 
-    Below the first slice there may be none, where it is the image itself. A sample of it is a seed
-    when it is extremal among its neighbours in these two slices, and the extremum of the slice
-    near it grows with scale: with the second-order model at the sample, restricted to where the
-    derivatives along y and x vanish, :math:`s \partial_\lambda w` is positive, or becomes so less
-    than 5 % below the slice.
+    Below the first slice there may be none, where it is the image itself. A sample of it may be a
+    seed when it is extremal among its neighbours in these two slices; `growing` says whether it
+    is worth while.
     """
     parts = []
     for top, bottom in ranges(1, space.shape[1] - 1, 256):
         two = space.window(slice(0, 2), slice(top - 1, bottom + 1))
         parts.append(extrema_of_array(two[[1, 0, 1]], space.rounding, (top - 1, 0)))
     _, row, column, sign = np.concatenate([np.empty((0, 4), dtype=np.int64), *parts]).T
-    seeds = Seeds(
-        np.full(sign.size, space.sigma[0]),
-        space.y[row],
-        space.x[column],
-        sign.astype(np.float64),
-    )
+    sigma = np.full(sign.size, space.sigma[0])
+    return Seeds(sigma, space.y[row], space.x[column], sign.astype(np.float64))
+
+
+def growing(series: DogSeries, seeds: Seeds) -> Seeds:
+    r"""Seeds near which s w grows with scale.
+
+    By the second-order model at the seed, restricted to where the derivatives along y and x
+    vanish: :math:`s \partial_\lambda w` is positive, or becomes so less than 5 % below its scale.
+    """
     slope, curvature = along_curve(series.jets(seeds.sigma, seeds.y, seeds.x))
     grows = seeds.sign * slope > -0.05 * np.abs(curvature)
     return Seeds(seeds.sigma[grows], seeds.y[grows], seeds.x[grows], seeds.sign[grows])
@@ -326,7 +329,7 @@ def extrema_from(
 def climb(
     series: DogSeries, seeds: Seeds, sigma_min: float, sigma_max: float
 ) -> tuple[NDArray[np.float64], Jets]:
-    r"""Climb from each seed to an extremum of its sign.
+    r"""Climb from each seed to an extremum of its sign; returns those that arrive.
 
     A trust-region Newton iteration that maximises s w in the scale-space's own units: with
     gradient g and Hessian H at a point, the step d maximises the model
@@ -352,37 +355,75 @@ def climb(
     bounds = (low, sigma_max * _CLIMBS_BEYOND)
     within = (seeds.sigma >= bounds[0]) & (seeds.sigma <= bounds[1])
     points = np.stack([seeds.sigma, seeds.y, seeds.x], axis=1)[within]
-    sign = seeds.sign[within]
-    jets = series.jets(*points.T)
+    points, jets, arrived = climbed(series, points, seeds.sign[within], bounds)
+    return points[arrived], jets[arrived]
+
+
+def climbed(
+    series: DogSeries,
+    points: NDArray[np.float64],
+    sign: NDArray[np.float64],
+    bounds: tuple[float, float] | None,
+) -> tuple[NDArray[np.float64], Jets, NDArray[np.bool_]]:
+    """Climb from each point, see `climb`.
+
+    Parameters
+    ----------
+    series : DogSeries
+        The scale-space.
+    points : ndarray, shape (n, 3)
+        Scale and position where climbs start.
+    sign : ndarray, shape (n,)
+        +1 to climb w, -1 to climb -w.
+    bounds : (float, float), optional
+        Scales at which climbs are given up. None keeps each point at its scale: what is reached
+        is an extremum of that slice.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 3)
+        Where each climb ended.
+    jets : Jets
+        Value, gradient and Hessian there.
+    arrived : ndarray of bool, shape (n,)
+        Whether that is an extremum.
+    """
+    points = points.copy()
+    within = bounds or (0.0, math.inf)
+    jets = _jets(series, points, bounds is None)
     radius = np.full(sign.size, _FIRST_RADIUS)
     active = np.arange(sign.size)
     for _ in range(_MOST_STEPS):
         here = jets[active]
-        step, promised, at_end = _step(here, sign[active], radius[active])
-        # Two more steps follow, each of which doubles the number of correct digits.
+        model = here if bounds else _of_slice(here, sign[active], series.contrast)
+        step, promised, at_end = _step(model, sign[active], radius[active])
         there = _moved(points[active], step, series.shape)
-        inside = (there[:, 0] >= bounds[0]) & (there[:, 0] <= bounds[1])
-        goes_on = ~at_end & (radius[active] > np.where(inside, _LEAST_RADIUS, _HELD_RADIUS))
+        inside = (there[:, 0] >= within[0]) & (there[:, 0] <= within[1])
+        goes_on = ~at_end & (promised > 0)
+        goes_on &= radius[active] > np.where(inside, _LEAST_RADIUS, _HELD_RADIUS)
         active, step, promised = active[goes_on], step[goes_on], promised[goes_on]
         here, there, inside = here[goes_on], there[goes_on], inside[goes_on]
         if not active.size:
             break
-        trial = series.jets(*np.where(inside[:, None], there, points[active]).T)
+        # Where a step leaves the range, any point will do: it is not taken.
+        where = np.where(inside[:, None], there, points[active])
+        trial = _jets(series, where, bounds is None)
         gained = sign[active] * (trial.value - here.value)
         ratio = np.where(inside, gained / promised, -1.0)
         # Close to the maximum rounding hides what is gained, but not that the gradient shrinks.
-        shrunk = np.linalg.norm(trial.gradient, axis=1) < np.linalg.norm(here.gradient, axis=1)
-        tiny = promised < 1e-12 * series.contrast
-        taken = inside & ((ratio > 0.05) | (tiny & shrunk))
+        free = slice(None) if bounds else slice(1, None)
+        slopes = [np.linalg.norm(j.gradient[:, free], axis=1) for j in (here, trial)]
+        tiny = (promised < 1e-12 * series.contrast) & (slopes[1] < slopes[0])
+        taken = inside & ((ratio > 0.05) | tiny)
         length = np.linalg.norm(step, axis=1)
         grown = np.where(ratio > 0.7, np.maximum(radius[active], 2 * length), radius[active])
-        radius[active] = np.where(
-            taken & (ratio > 0.2) | (tiny & taken), np.minimum(grown, _LARGEST_RADIUS), length / 3
-        )
+        trusted = taken & ((ratio > 0.2) | tiny)
+        radius[active] = np.where(trusted, np.minimum(grown, _LARGEST_RADIUS), length / 3)
         rows = active[taken]
         points[rows] = there[taken]
         jets.put(rows, trial[taken])
-    return _polished(series, points, jets, bounds)
+    arrived = _polish(series, points, jets, sign, bounds is None)
+    return points, jets, arrived
 
 
 def check_scales(camera_blur: float, sigma_min: float, sigma_max: float, kappa: float) -> None:
@@ -403,7 +444,8 @@ def check_scales(camera_blur: float, sigma_min: float, sigma_max: float, kappa: 
         )
 
 
-def _samplings(n_spo: Sequence[int]) -> list[int]:
+def listed(n_spo: Sequence[int]) -> list[int]:
+    """Numbers of scales per octave, checked."""
     try:
         samplings = list(n_spo)
     except TypeError:  # one number
@@ -461,28 +503,65 @@ def _moved(
     moved = np.empty_like(points)
     moved[:, 0] = points[:, 0] * np.exp(step[:, 0])
     moved[:, 1:] = points[:, 1:] + points[:, :1] * step[:, 1:]
+    return folded(moved, shape)
+
+
+def folded(points: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Points of the mirrored image where the image itself shows the same: between its mirrors."""
+    inside = points.copy()
     for axis, n in enumerate(shape, start=1):
-        moved[:, axis] = np.abs(moved[:, axis] + 0.5) - 0.5
-        moved[:, axis] = n - 0.5 - np.abs(n - 0.5 - moved[:, axis])
-    return moved
+        turned = np.mod(points[:, axis] + 0.5, 2.0 * n)
+        inside[:, axis] = np.minimum(turned, 2.0 * n - turned) - 0.5
+    return inside
 
 
-def _polished(
-    series: DogSeries, points: NDArray[np.float64], jets: Jets, bounds: tuple[float, float]
-) -> tuple[NDArray[np.float64], Jets]:
-    """Take two plain Newton steps from points near an extremum; drop all others."""
-    values = np.linalg.eigvalsh(jets.hessian)
-    definite = (values[:, 0] > 0) | (values[:, 2] < 0)
-    near = definite & (np.linalg.norm(_newton_step(jets), axis=1) < 1e-4)
-    points, jets = points[near], jets[near]
+def _jets(series: DogSeries, points: NDArray[np.float64], within_slices: bool = False) -> Jets:
+    sigma, y, x = points.T
+    return series.jets(sigma, y, x, within_slices)
+
+
+def _of_slice(jets: Jets, sign: NDArray[np.float64], contrast: float) -> Jets:
+    """Jets of which no climb leaves the slice: flat along scale, and curved the right way."""
+    gradient, hessian = jets.gradient.copy(), jets.hessian.copy()
+    gradient[:, 0] = 0.0
+    hessian[:, 0, :] = hessian[:, :, 0] = 0.0
+    hessian[:, 0, 0] = -sign * contrast
+    return Jets(jets.value, gradient, hessian)
+
+
+def _polish(
+    series: DogSeries,
+    points: NDArray[np.float64],
+    jets: Jets,
+    sign: NDArray[np.float64],
+    slices: bool,
+) -> NDArray[np.bool_]:
+    """Take two plain Newton steps from points near an extremum, in place; say which are near.
+
+    Their jets have all derivatives afterwards, also where climbs within slices did without.
+    """
+
+    def model(j: Jets, rows: NDArray[np.intp]) -> Jets:
+        return _of_slice(j, sign[rows], series.contrast) if slices else j
+
+    every = np.arange(sign.size)
+    here = model(jets, every)
+    values = np.linalg.eigvalsh(-sign[:, None, None] * here.hessian)
+    arrived = (values[:, 0] > 0) & (np.linalg.norm(_newton_step(here), axis=1) < 1e-4)
+    rows = every[arrived]
+    # The first of them leaves at most 1e-8 of the way, the second what rounding does.
+    if slices:
+        jets.put(rows, _jets(series, points[rows]))
     for _ in range(2):
-        there = _moved(points, _newton_step(jets), series.shape)
-        there[:, 0] = np.clip(there[:, 0], *bounds)
-        trial = series.jets(*there.T)
-        better = np.linalg.norm(trial.gradient, axis=1) < np.linalg.norm(jets.gradient, axis=1)
-        points[better] = there[better]
-        jets.put(better, trial[better])
-    return points, jets
+        here = model(jets[rows], rows)
+        there = _moved(points[rows], _newton_step(here), series.shape)
+        trial = _jets(series, there)
+        slopes = [np.linalg.norm(j.gradient, axis=1) for j in (here, model(trial, rows))]
+        better = slopes[1] < slopes[0]
+        points[rows[better]] = there[better]
+        jets.put(rows[better], trial[better])
+        rows = rows[better]
+    return arrived
 
 
 def _merged(table: pd.DataFrame) -> pd.DataFrame:
