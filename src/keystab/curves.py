@@ -91,7 +91,8 @@ def crossings(
     Between two slices :math:`\partial_\lambda w` along a curve is approximated by the cubic with
     the values and derivatives at both ends. What can be missed is a curve that begins and ends
     between two slices, and two sign changes between two slices of which that cubic knows nothing;
-    more slices tell.
+    more slices tell. On the study's picture the default finds 881 of the 883 extrema of
+    `keystab.truth.true_extrema`, and no other; the two have a conditioning of about 0.01 and 0.02.
 
     Examples
     --------
@@ -153,6 +154,11 @@ def critical_balance(series: DogSeries, sigma: float, step: float = 0.25) -> tup
         By how much the number of maxima and minima exceeds that of saddles.
     count : int
         Number of critical points.
+
+    Notes
+    -----
+    Of a pair of an extremum and a saddle that are about to meet, samples may show only one. What
+    is then missing from a slice is still found where its curve leads to it from another slice.
     """
     y, x, values = _sampled(series, sigma, step)
     # Around a saddle the values rise above its own and fall below at least twice.

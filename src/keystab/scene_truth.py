@@ -92,8 +92,10 @@ def scene_extrema(
 
     Notes
     -----
-    A noiseless view that is sampled well enough (c about 1.1) has the same extrema to about 1e-3
-    pixels, except for badly conditioned ones. What else it has, or lacks, is the camera's doing.
+    A noiseless view has the same extrema but for its aliasing. On the study's picture (S = 10, 15
+    pixels from the border), those of a view with c = 1.1 lie 5e-4 pixels from the scene's in the
+    median; all of the 288 with a conditioning above 0.1 are there, 95 % within 0.01 pixels and
+    none farther than 0.04; of those between 0.03 and 0.1, 2 % have no counterpart within 0.3.
 
     Beyond its border the reference continues as its mirror image, as for `keystab.simulate_view`,
     and extrema of the continuation count where the view shows them.

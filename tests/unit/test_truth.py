@@ -177,7 +177,7 @@ def test_the_range_of_scales_cuts_and_does_nothing_else(crowd):
 def test_extrema_just_above_the_cameras_blur_are_found():
     for sigma in (1.1001, 1.102, 1.11, 1.13):
         size = sigma * math.sqrt(KAPPA)
-        found = true_extrema(blob((48, 48), (23.3, 24.4), math.hypot(size, 1.1)), 1.1)
+        found = true_extrema(blob((48, 48), (23.3, 24.4), math.hypot(size, 1.1)), 1.1, n_spo=[10])
         assert abs(found.loc[found["value"].idxmin(), "sigma"] - sigma) < 1e-4
 
 
@@ -271,8 +271,8 @@ def scene():
 def test_a_well_sampled_view_has_the_extrema_of_its_scene(scene):
     # The view sees all of the reference, so that both have the same mirrors.
     spec = ViewSpec(1.6, 10.0, (40, 44))
-    of_view = true_extrema(simulate(scene, spec), 1.6, 1.6, 3.2)
-    of_scene = scene_extrema(scene, spec, 1.6, 3.2)
+    of_view = true_extrema(simulate(scene, spec), 1.6, 1.6, 3.2, n_spo=[10])
+    of_scene = scene_extrema(scene, spec, 1.6, 3.2, n_spo=[10])
     # Frequencies beyond a cycle per two pixels are damped by exp(-(1.6 pi)^2 / 2) = 3e-6, and less.
     assert len(of_scene) > 10 and same_set(of_view, of_scene, 1e-5)
 
@@ -293,8 +293,8 @@ def test_a_view_moves_the_extrema_of_the_scene_and_nothing_else(scene, change):
         ViewSpec(**({"blur": 1.1, "step": 10.0, "shape": (24, 26)} | c)) for c in ({}, change)
     )
     ratio = first.step / second.step
-    a = scene_extrema(scene, first, 1.3, 2.2)
-    b = scene_extrema(scene, second, 1.3 * ratio, 2.2 * ratio)
+    a = scene_extrema(scene, first, 1.3, 2.2, n_spo=[10])
+    b = scene_extrema(scene, second, 1.3 * ratio, 2.2 * ratio, n_spo=[10])
     y, x = to_view(second, scene.shape, *to_reference(first, scene.shape, a["y"], a["x"]))
     moved = a.assign(y=y, x=x, sigma=a["sigma"] * ratio)
     moved = moved[(y >= 0) & (y <= 23) & (x >= 0) & (x <= 25)]
@@ -304,11 +304,11 @@ def test_a_view_moves_the_extrema_of_the_scene_and_nothing_else(scene, change):
 
 
 def test_a_view_beyond_the_border_sees_mirrored_extrema(scene):
-    all_of_it = scene_extrema(scene, ViewSpec(1.1, 10.0, (40, 44)))
-    beyond = scene_extrema(scene, ViewSpec(1.1, 10.0, (40, 44), shift=(40.0, 0.0)))
+    all_of_it = scene_extrema(scene, ViewSpec(1.1, 10.0, (40, 44)), n_spo=[10])
+    beyond = scene_extrema(scene, ViewSpec(1.1, 10.0, (40, 44), shift=(40.0, 0.0)), n_spo=[10])
     mirrored = all_of_it.assign(y=39 - all_of_it["y"])
     assert len(beyond) > 5 and same_set(beyond, mirrored)
-    both = scene_extrema(scene, ViewSpec(1.1, 10.0, (80, 44), shift=(20.0, 0.0)))
+    both = scene_extrema(scene, ViewSpec(1.1, 10.0, (80, 44), shift=(20.0, 0.0)), n_spo=[10])
     upper = both[both["y"] <= 39].reset_index(drop=True)
     assert same_set(upper, all_of_it)
     # On the mirror axis an extremum is seen once.
@@ -320,7 +320,7 @@ def test_the_blur_of_the_reference_counts(scene):
     # A scene of blobs of s, photographed with a blur of 10 reference pixels.
     size, own = 24.0, 10.0
     picture = blob((300, 300), (140.0, 150.0), math.hypot(size, own))
-    found = scene_extrema(picture, ViewSpec(0.5, 10.0, (30, 30)), reference_blur=own)
+    found = scene_extrema(picture, ViewSpec(0.5, 10.0, (30, 30)), reference_blur=own, n_spo=[5])
     best = found.loc[found["value"].idxmin()]
     expected = [(140 - 4.5) / 10, (150 - 4.5) / 10, size / 10 / math.sqrt(KAPPA)]
     np.testing.assert_allclose(best[["y", "x", "sigma"]].tolist(), expected, rtol=0, atol=1e-9)
