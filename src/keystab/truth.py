@@ -155,8 +155,13 @@ def true_extrema(
     Degenerate extrema are left out: where the smallest curvature is below 1e-10 of the image's
     standard deviation, rounding decides where they are, or whether.
 
-    Completeness is a matter of the seeds. On the study's picture a second search that follows the
-    extrema of each scale through the scales (`keystab.curves.crossings`) finds nothing else.
+    Completeness is a matter of the seeds. On the study's picture seeds from samplings twice as
+    dense find the same 883 extrema, and a second search that follows the extrema of each scale
+    through the scales (`keystab.curves.crossings`) finds nothing else.
+
+    Every evaluation is a sum over all pixels' worth of coefficients, and the number of extrema
+    grows with the picture too: time grows with the square of its area. A picture of 400 x 225
+    pixels takes 20 s on one core.
 
     The noise and the aliasing of an image are part of it; `keystab.scene_extrema` gives the
     extrema that a view of a known scene should have.
