@@ -139,7 +139,7 @@ def truth(args: argparse.Namespace) -> None:
         sys.stdout.write(to_csv(extrema))
     else:
         write_table(extrema, args.output)
-    found = f"{len(extrema)} extrem{'um' if len(extrema) == 1 else 'a'}"
+    found = f"{len(extrema)} {'extremum' if len(extrema) == 1 else 'extrema'}"
     print(f"{args.picture}: {found} in {seconds:.1f} s", file=sys.stderr)
 
 

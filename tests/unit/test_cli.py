@@ -94,7 +94,7 @@ def test_truth_passes_every_parameter(picture, tmp_path, capsys):
     out = tmp_path / "truth.parquet"
     assert cli.main(["truth", str(picture), "-o", str(out), *flags]) == 0
     expected = true_extrema(read_picture(picture), **changed)
-    assert f": {len(expected)} extrem" in capsys.readouterr().err
+    assert f": {len(expected)} extrema" in capsys.readouterr().err
     # closed form, for a picture whose blur is in truth 0.8
     size = math.sqrt(9 + 0.8**2 - 0.7**2)
     assert expected.loc[expected["value"].idxmin(), "sigma"] == pytest.approx(size / 1.3**0.5)
