@@ -17,6 +17,7 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/simulate.smk"  # the reference picture -> sets of views
 include: "workflow/rules/scale_space.smk"  # a view -> a stored scale-space, where one is kept
 include: "workflow/rules/detect.smk"  # a view or its scale-space -> extrema, with refinement traces
+include: "workflow/rules/truth.smk"  # a view -> what a detector should find, where it is asked for
 include: "workflow/rules/match.smk"  # extrema of many samplings -> tables
 include: "workflow/rules/compare.smk"  # extrema of many views -> tables
 include: "workflow/rules/floor.smk"  # views -> extrema in variants of the arithmetic -> tables

@@ -30,7 +30,9 @@ _HOME = {
     "open_views": "stores",
     "read_picture": "pictures",
     "scale_space": "dog_space",
+    "scene_extrema": "scene_truth",
     "simulate_view": "camera",
+    "true_extrema": "truth",
     "unique_keypoints": "matching",
 }
 

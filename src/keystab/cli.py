@@ -106,12 +106,10 @@ def simulate(args: argparse.Namespace) -> None:
 def detect(args: argparse.Namespace) -> None:
     """Detect the keypoints of a picture and write them as a table."""
     from keystab.detection import detect_keypoints
-    from keystab.files import check_writable
     from keystab.pictures import read_picture
-    from keystab.tables import FORMATS, to_csv, write_table
+    from keystab.tables import to_csv, write_table
 
-    if args.output is not None:
-        check_writable(args.output, FORMATS)
+    _check_table(args.output)
     image = read_picture(args.picture)
     options = {name: getattr(args, name) for name in args.parameters}
     start = time.monotonic()
@@ -147,11 +145,40 @@ def blur(args: argparse.Namespace) -> None:
     )
 
 
+def truth(args: argparse.Namespace) -> None:
+    """Find the true extrema of a picture and write them as a table."""
+    from keystab.pictures import read_picture
+    from keystab.tables import to_csv, write_table
+    from keystab.truth import true_extrema
+
+    _check_table(args.output)
+    image = read_picture(args.picture)
+    options = {name: getattr(args, name) for name in args.parameters}
+    start = time.monotonic()
+    extrema = true_extrema(image, **options)
+    seconds = time.monotonic() - start
+    if args.output is None:
+        sys.stdout.write(to_csv(extrema))
+    else:
+        write_table(extrema, args.output)
+    found = f"{len(extrema)} {'extremum' if len(extrema) == 1 else 'extrema'}"
+    print(f"{args.picture}: {found} in {seconds:.1f} s", file=sys.stderr)
+
+
 def inspect(args: argparse.Namespace) -> None:
     """Say in words what a store or a table holds."""
     from keystab.inspection import describe
 
     print(describe(args.path))
+
+
+def _check_table(path: Path | None) -> None:
+    """Refuse a table that cannot be written before anything is computed."""
+    from keystab.files import check_writable
+    from keystab.tables import FORMATS
+
+    if path is not None:
+        check_writable(path, FORMATS)
 
 
 def _is_png(path: Path) -> bool:
@@ -189,6 +216,15 @@ def _parser() -> argparse.ArgumentParser:
             description="Say what camera blur a measured point spread function has: the standard "
             "deviation of the Gaussian that fits its picture best in least squares, for "
             "--camera-blur of keystab detect.",
+        )
+    )
+    _truth_arguments(
+        commands.add_parser(
+            "truth",
+            help="find the true extrema of a picture",
+            description="Find all extrema of the continuous difference-of-Gaussians scale-space "
+            "of a picture, to some twelve digits: what a detector at any sampling should find.",
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
         )
     )
     to = commands.add_parser(
@@ -318,6 +354,33 @@ def _background(text: str) -> float | str:
         return float(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is no level; give a number or border") from None
+
+
+def _truth_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=truth)
+    to.add_argument("picture", metavar="PICTURE", type=Path, help="PNG, TIFF, JPEG or npy")
+    to.add_argument(
+        "-o", "--output", metavar="OUT", type=Path, default=argparse.SUPPRESS,
+        help="table to write, .csv or .parquet; standard output if not given",
+    )  # fmt: skip
+    flags = [
+        to.add_argument(
+            "--camera-blur", type=float, required=True, metavar="C", default=argparse.SUPPRESS,
+            help="Gaussian blur that the picture already has, pixels",
+        ),
+        to.add_argument("--sigma-min", type=float, default=1.1, metavar="S", help="first scale"),
+        to.add_argument("--sigma-max", type=float, default=2.2, metavar="S", help="last scale"),
+        to.add_argument(
+            "--kappa", type=float, default=2 ** (1 / 3), metavar="K",
+            help="ratio of the two blurs of the difference of Gaussians",
+        ),
+        to.add_argument(
+            "--n-spo", type=int, nargs="+", default=(5, 10, 15), metavar="N",
+            help="scales per octave of the samplings that the search starts from",
+        ),
+        to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
+    ]  # fmt: skip
+    to.set_defaults(parameters=[flag.dest for flag in flags], output=None)
 
 
 def _seed(text: str) -> int | str:

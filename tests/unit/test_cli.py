@@ -17,6 +17,7 @@ from keystab.extrema import bytes_of_search
 from keystab.pictures import read_picture, write_picture
 from keystab.psf import fit_psf
 from keystab.tables import read_table
+from keystab.truth import true_extrema
 
 
 @pytest.fixture
@@ -71,6 +72,37 @@ def test_detect_passes_every_parameter(picture, tmp_path):
     expected = detect_keypoints(read_picture(picture), **changed)
     assert len(expected) > 0
     pd.testing.assert_frame_equal(read_table(out), expected)
+
+
+def test_truth_passes_every_parameter(picture, tmp_path, capsys):
+    changed = {
+        "camera_blur": 0.7,
+        "sigma_min": 1.3,
+        "sigma_max": 2.9,
+        "kappa": 1.3,
+        "n_spo": [4, 6],
+        "threads": 2,
+    }
+    parameters = inspect.signature(true_extrema).parameters
+    assert list(parameters)[1:] == list(changed)  # every parameter has a flag
+    defaults = cli._parser().parse_args(["truth", "x.png", "--camera-blur", "1"])
+    for name, parameter in list(parameters.items())[2:]:
+        assert getattr(defaults, name) == parameter.default, name
+    flags = []
+    for name, value in changed.items():
+        values = value if isinstance(value, list) else [value]
+        flags += ["--" + name.replace("_", "-"), *map(str, values)]
+    out = tmp_path / "truth.parquet"
+    assert cli.main(["truth", str(picture), "-o", str(out), *flags]) == 0
+    expected = true_extrema(read_picture(picture), **changed)
+    assert f": {len(expected)} extrema" in capsys.readouterr().err
+    # closed form, for a picture whose blur is in truth 0.8
+    size = math.sqrt(9 + 0.8**2 - 0.7**2)
+    assert expected.loc[expected["value"].idxmin(), "sigma"] == pytest.approx(size / 1.3**0.5)
+    pd.testing.assert_frame_equal(read_table(out), expected)
+    assert cli.main(["truth", str(picture), *flags]) == 0
+    printed = pd.read_csv(io.StringIO(capsys.readouterr().out))
+    pd.testing.assert_frame_equal(printed, expected)
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".tiff", ".png"])
@@ -146,6 +178,10 @@ BLUR = "--camera-blur 0.8"
         ("blur PICTURE --background dark", "'dark' is no level; give a number or border"),
         ("blur PICTURE --background 2", "nothing in the picture lies above the background"),
         ("blur PICTURE --oversampling 0", "oversampling is 0"),
+        ("truth PICTURE", "--camera-blur"),
+        (f"truth PICTURE {BLUR} --n-spo 0", "n_spo is 0"),
+        (f"truth PICTURE {BLUR} --sigma-max 1", "sigma_max is 1"),
+        (f"truth PICTURE {BLUR} -o truth.txt", "cannot write '.txt'; use .csv or .parquet"),
         ("inspect gone", "gone: no such file"),
         ("inspect PICTURE", "ends in .csv or .parquet"),
         ("inspect .", "no store of keystab here"),

@@ -17,6 +17,7 @@ from keystab.stages import (
     cut_cubes,
     detect,
     detect_views,
+    find_truth,
     match_samplings,
     scale_space,
     scale_spaces,
@@ -226,6 +227,21 @@ def test_refined_keypoints_are_counted_with_and_without_an_upper_end(reference, 
     assert (open_end["n_refined_octave"] == closed["n_refined_common"]).all()
     assert (closed["n_refined_octave"] == closed["n_refined_common"]).all()
     assert closed["n_common"].sum() < open_end["n_common"].sum()
+
+
+def test_the_truth_is_that_of_the_stored_view(reference, tmp_path):
+    from keystab.stages._inputs import read_view
+    from keystab.truth import true_extrema
+
+    assert simulate.main(view_arguments(reference, tmp_path, step="5", blur="0.9")) == 0
+    given = [str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]
+    out = tmp_path / "truth.parquet"
+    arguments = ["--views", *given, "--sigma-min", "1.2", "--kappa", "1.3", "--table", str(out)]
+    assert find_truth.main(arguments) == 0
+    view = read_view(tmp_path / "views", tmp_path / "views.sha256")
+    found = read_table(out)
+    assert len(found) > 3 and view.blur == 0.9
+    assert found.equals(true_extrema(view.image, 0.9, 1.2, 2.4, 1.3))
 
 
 def test_a_picture_without_detail_has_no_keypoints_and_is_named_where_some_are_needed(

@@ -1,0 +1,31 @@
+"""Find the true extrema of the octave of a view that the samplings sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from keystab.stages import _run
+
+
+@_run.stage
+def main(argv: Sequence[str] | None = None) -> None:
+    """Read the view; write its true extrema."""
+    parser = _run.parser(__doc__)
+    _run.views_arguments(parser)
+    _run.scale_arguments(parser)
+    _run.required(parser, "table", "table to write", type=Path)
+    args = parser.parse_args(argv)
+
+    from keystab.stages._inputs import read_view
+    from keystab.tables import write_table
+    from keystab.truth import true_extrema
+
+    view = read_view(args.views, args.views_digest)
+    extrema = true_extrema(view.image, view.blur, args.sigma_min, 2.0 * args.sigma_min, args.kappa)
+    write_table(extrema, args.table)
+    print(f"{len(extrema)} true extrema")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
