@@ -93,7 +93,7 @@ def shade(share: float) -> tuple[float, float, float]:
 
     Examples
     --------
-    >>> sum(shade(0.0)) > sum(shade(0.5)) > sum(shade(1.0))
+    >>> bool(sum(shade(0.0)) > sum(shade(0.5)) > sum(shade(1.0)))
     True
     """
     import seaborn
