@@ -37,7 +37,7 @@ _NEGLIGIBLE = 3e-17
 # which less than this is left of their sum (which is 1) is cut off, and the sum restored; but only
 # where rows become so many times shorter, because on small images whole rows cost little.
 _NEGLIGIBLE_RINGING = 1e-13
-_WORTH_CUTTING = 12
+_WORTH_CUTTING = 4
 
 # From this blur on, in samples, the band limit of the grid lies below the last digit: the kernel is
 # a sampled Gaussian and ends where that does, at 8.6 standard deviations.
