@@ -90,16 +90,6 @@ def setting(place):
     return value_of
 
 
-def of_every_view(key):
-    """Parameter with the values of one property of all views of a set."""
-
-    def values_of(wildcards):
-        values = view_sets.per_view(config["sets"][wildcards.set])[key]
-        return Named(f"{wildcards.set}.{key}", values)
-
-    return values_of
-
-
 wildcard_constraints:
     set="[a-z][a-z0-9_]*",
     n_spo="[0-9]+",
@@ -127,37 +117,3 @@ def max_offset_of_path(_wildcards):
     refinement = config["refinement"]
     depends = refinement["move"] == "unit_step"
     return Named("refinement.max_offset", refinement["max_offset"] if depends else None)
-
-
-def sigma_min_of_set(wildcards):
-    """First scale of the scale-spaces of a set."""
-    own = config["sets"][wildcards.set]["sigma_min"]
-    sigma_min = config["detector"]["sigma_min"] if own is None else own
-    return Named(f"{wildcards.set}.sigma_min", sigma_min)
-
-
-def assumed_blur_of_set(wildcards):
-    """Blur that the detector assumes for a set; None for that of each view."""
-    return Named(
-        f"{wildcards.set}.assumed_blur", view_sets.assumed_blur(config["sets"][wildcards.set])
-    )
-
-
-def detections_of(set_name, what):
-    """Tables of a set, one per sampling at which it is searched."""
-    return expand(
-        f"{RESULTS}/keypoints/{set_name}/{what}_n{{n_spo}}.parquet",
-        n_spo=config["sets"][set_name]["n_spo"],
-    )
-
-
-def kappas(_wildcards):
-    """Ratios of the difference of Gaussians that figure 9 compares, smallest first."""
-    fractions = sorted(config["kappas"]["fractions"], reverse=True)
-    return Named("kappas.fractions", [2 ** (1 / fraction) for fraction in fractions])
-
-
-def dtype_of_set(wildcards):
-    """Number type in which the views of a set are stored."""
-    own = config["sets"][wildcards.set]["dtype"]
-    return Named("dtype", config["views_dtype"] if own is None else own)

@@ -4,26 +4,6 @@ Comes in: views. Goes out: {results}/tables/floor_*.csv. Steps: compute the extr
 samplings in variants of precision, tolerance, interpolation and view; count the new and the lost.
 """
 
-VARIANTS = list(config["floor"]["variants"])
-
-
-def view_of_variant(wildcards):
-    """Store of the view that a variant searches."""
-    name = config["floor"]["variants"][wildcards.variant]["set"]
-    return ancient(f"{RESULTS}/views/{name}")
-
-
-def digest_of_variant(wildcards):
-    """Seal of the view that a variant searches."""
-    name = config["floor"]["variants"][wildcards.variant]["set"]
-    return f"{RESULTS}/views/{name}.sha256"
-
-
-def files_of_variants(path):
-    """Files of the views that the variants search, one per variant."""
-    sets = [variant["set"] for variant in config["floor"]["variants"].values()]
-    return [path.format(set=name) for name in sets]
-
 
 rule detect_variant:
     """Detect the extrema of all balanced samplings in one variant."""

@@ -1,0 +1,180 @@
+"""What rules ask of sets of views: which one a figure studies, its files, its parameters.
+
+Comes in: complete settings. Goes out: functions that name inputs and parameters; no rules.
+"""
+
+# Figure -> the set of views, or the sweep, that it studies.
+VIEWS_OF = {"fig7": "translations", "fig8": "zooms", "figS1": "rotations"}
+SWEEP_OF = {"fig10": "aliasing", "fig11": "unknown_blur", "fig12": "noise"}
+SWEPT = {"fig10": "blur", "fig11": "blur_spread", "fig12": "noise"}
+VARIANTS = list(config["floor"]["variants"])
+
+
+def of_every_view(key):
+    """Parameter with the values of one property of all views of a set."""
+
+    def values_of(wildcards):
+        values = view_sets.per_view(config["sets"][wildcards.set])[key]
+        return Named(f"{wildcards.set}.{key}", values)
+
+    return values_of
+
+
+def sigma_min_of_set(wildcards):
+    """First scale of the scale-spaces of a set."""
+    own = config["sets"][wildcards.set]["sigma_min"]
+    sigma_min = config["detector"]["sigma_min"] if own is None else own
+    return Named(f"{wildcards.set}.sigma_min", sigma_min)
+
+
+def assumed_blur_of_set(wildcards):
+    """Blur that the detector assumes for a set; None for that of each view."""
+    return Named(
+        f"{wildcards.set}.assumed_blur", view_sets.assumed_blur(config["sets"][wildcards.set])
+    )
+
+
+def detections_of(set_name, what):
+    """Tables of a set, one per sampling at which it is searched."""
+    return expand(
+        f"{RESULTS}/keypoints/{set_name}/{what}_n{{n_spo}}.parquet",
+        n_spo=config["sets"][set_name]["n_spo"],
+    )
+
+
+def kappas(_wildcards):
+    """Ratios of the difference of Gaussians that figure 9 compares, smallest first."""
+    fractions = sorted(config["kappas"]["fractions"], reverse=True)
+    return Named("kappas.fractions", [2 ** (1 / fraction) for fraction in fractions])
+
+
+def dtype_of_set(wildcards):
+    """Number type in which the views of a set are stored."""
+    own = config["sets"][wildcards.set]["dtype"]
+    return Named("dtype", config["views_dtype"] if own is None else own)
+
+
+def views_of_figure(wildcards):
+    """Store of the set of views that a figure studies."""
+    return ancient(f"{RESULTS}/views/{VIEWS_OF[wildcards.figure]}")
+
+
+def digest_of_figure(wildcards):
+    """Seal of the set of views that a figure studies."""
+    return f"{RESULTS}/views/{VIEWS_OF[wildcards.figure]}.sha256"
+
+
+def extrema_of_figure(wildcards):
+    """Extrema of the set of views that a figure studies, at all its samplings."""
+    return detections_of(VIEWS_OF[wildcards.figure], "extrema")
+
+
+def traces_of_figure(wildcards):
+    """Refinement traces of the set of views that a figure studies, at all its samplings."""
+    return detections_of(VIEWS_OF[wildcards.figure], "traces")
+
+
+def of_views(key):
+    """Parameter with a setting of the set of views that a figure studies."""
+
+    def value_of(wildcards):
+        name = VIEWS_OF[wildcards.figure]
+        return Named(f"{name}.{key}", config["sets"][name][key])
+
+    return value_of
+
+
+def sigma_min_of_views(wildcards):
+    """First scale of the set of views that a figure studies."""
+    name = VIEWS_OF.get(wildcards.figure) or SWEEPS[SWEEP_OF[wildcards.figure]][0].name
+    own = config["sets"][name]["sigma_min"]
+    return Named("sigma_min", config["detector"]["sigma_min"] if own is None else own)
+
+
+def further_max_offsets(wildcards):
+    """Values of M_offset whose curves figure 7 draws; none for the other figures."""
+    drawn = wildcards.figure == "fig7"
+    return Named("max_offsets", config["stability"]["max_offsets"] if drawn else [])
+
+
+def further_iterations(wildcards):
+    """Values of N_interp whose curves figure 7 draws; none for the other figures."""
+    drawn = wildcards.figure == "fig7"
+    return Named("max_iterations", config["stability"]["max_iterations"] if drawn else [])
+
+
+def of_sweep(path):
+    """Files of all sets of the sweep that a figure studies; `path` has the name of the set."""
+
+    def files_of(wildcards):
+        return [path.format(set=one.name) for one in SWEEPS[SWEEP_OF[wildcards.figure]]]
+
+    return files_of
+
+
+def views_of_sweep(wildcards):
+    """Stores of all sets of the sweep that a figure studies."""
+    return ancient(of_sweep(f"{RESULTS}/views/{{set}}")(wildcards))
+
+
+def detections_of_sweep(what):
+    """Tables of all sets of the sweep that a figure studies, at their one sampling."""
+
+    def tables_of(wildcards):
+        names = [one.name for one in SWEEPS[SWEEP_OF[wildcards.figure]]]
+        return [table for name in names for table in detections_of(name, what)]
+
+    return tables_of
+
+
+def name_of_sweep(wildcards):
+    """What the sets of the sweep that a figure studies differ in."""
+    return SWEPT[wildcards.figure]
+
+
+def values_of_sweep(wildcards):
+    """Values of the sets of the sweep that a figure studies."""
+    name = SWEEP_OF[wildcards.figure]
+    return Named(f"{name}.sweep", [one.value for one in SWEEPS[name]])
+
+
+def in_sweep(key):
+    """Parameter with a setting that all sets of the sweep that a figure studies share."""
+
+    def value_of(wildcards):
+        first = SWEEPS[SWEEP_OF[wildcards.figure]][0].name
+        return Named(f"{first}.{key}", config["sets"][first][key])
+
+    return value_of
+
+
+def starts_of_sweep(wildcards):
+    """First scales of the octaves that lie within those searched for a figure."""
+    n_oct = in_sweep("n_oct")(wildcards)
+    end = float(sigma_min_of_views(wildcards)) * 2 ** int(n_oct)
+    starts = config["stability"]["starts"]
+    return Named("starts", [start for start in starts if 2 * start <= end * (1 + 1e-9)])
+
+
+def blur_of_noisy_views(_wildcards):
+    """Camera blur of the views of figure 12, which all share it."""
+    blurs = view_sets.per_view(config["sets"][SWEEPS["noise"][0].name])["blur"]
+    return Named("noise.blur", max(blurs))
+
+
+def view_of_variant(wildcards):
+    """Store of the view that a variant searches."""
+    name = config["floor"]["variants"][wildcards.variant]["set"]
+    return ancient(f"{RESULTS}/views/{name}")
+
+
+def digest_of_variant(wildcards):
+    """Seal of the view that a variant searches."""
+    name = config["floor"]["variants"][wildcards.variant]["set"]
+    return f"{RESULTS}/views/{name}.sha256"
+
+
+def files_of_variants(path):
+    """Files of the views that the variants search, one per variant."""
+    sets = [variant["set"] for variant in config["floor"]["variants"].values()]
+    return [path.format(set=name) for name in sets]
