@@ -21,7 +21,8 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "REPRODUCING.md"
 BEGIN, END = "<!-- costs: begin -->\n", "<!-- costs: end -->\n"
 TARGETS = {
-    **{f"Figure {n}": [f"figures/fig{n}.pdf"] for n in range(1, 7)},
+    **{f"Figure {n}": [f"figures/fig{n}.pdf"] for n in (*range(1, 13), "S1", "S2", "S3", "S4")},
+    "Figure floor": ["figures/floor.pdf"],
     "Everything": [],
 }
 

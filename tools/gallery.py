@@ -25,7 +25,7 @@ def small(picture: Image.Image) -> Image.Image:
 
 def main() -> int:
     """Write one small picture per figure."""
-    for figure in sorted((ROOT / "figures").glob("fig*.png")):
+    for figure in sorted((ROOT / "figures").glob("*.png")):
         out = ROOT / "docs/figures" / figure.name
         out.parent.mkdir(parents=True, exist_ok=True)
         with Image.open(figure) as picture:
