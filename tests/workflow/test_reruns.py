@@ -78,7 +78,7 @@ def test_edits_of_code(finished, name, old, new, expected):
         ("optics: {defocus: 20.0}", {"camera_optics", "figS3"}),
         ("blobs: {camera_blur: 0.7}", BLOBS),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
-        ("stability: {n_resamples: 200}", VIEWS),
+        ("stability: {n_resamples: 200}", VIEWS | {"match_sweep", "fig10", "fig11", "fig12"}),
         ("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7"}),
         ("shipped: {contrast: 0.02}", {"match_shipped", "fig7"}),
         ("kappas: {fractions: [2, 5]}", {"detect_kappas"} | KAPPAS),
