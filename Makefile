@@ -23,7 +23,7 @@ help: ## List the targets
 study: environment ## The whole study
 	$(SNAKEMAKE) $(OVERLAY)
 
-quick: environment ## Every figure in draft form, in two minutes
+quick: environment ## Every figure in draft form, in some minutes
 	$(SNAKEMAKE) $(QUICK)
 
 figures/quick/% results/quick/%: environment FORCE
