@@ -24,7 +24,7 @@ study: environment ## The whole study
 	$(SNAKEMAKE) $(OVERLAY)
 
 quick: environment ## Every figure in draft form, in some minutes
-	$(SNAKEMAKE) $(QUICK)
+	snakemake --cores $(CORES) $(QUICK)
 
 figures/quick/% results/quick/%: environment FORCE
 	$(SNAKEMAKE) $@ $(QUICK)

@@ -21,19 +21,16 @@ source that the block sees, a Gaussian is off by at most
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from keystab.block_rows import AxisBlocks, axis_blocks, expansion, whole_rows
 from keystab.dog_space import ScaleSpace
-from keystab.operators import Block, SplineAxis
+from keystab.operators import SplineAxis
 
-# Length of a block along either axis in standard deviations of 1.1 px, and nodes in it.
-_LENGTH, _NODES = 2.8, 12
+# Length of a block along either axis in standard deviations of 1.1 px.
+_LENGTH = 2.8
 
 # Blocks that one column of blocks is wide: its Gaussians, slices and samples stay in the cache.
 _ABREAST = 4
@@ -71,126 +68,13 @@ def block_length(space: ScaleSpace) -> int:
     return min(48, int(_LENGTH * sampling.sigma_min / sampling.delta_min))
 
 
-@lru_cache(maxsize=8)
-def expansion(length: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Nodes of a block, and the matrix from values there to values at all its samples.
+def starts_of(n_samples: int, length: int) -> tuple[int, ...]:
+    """First samples of the blocks of an axis; the last ends with it, and may overlap more.
 
-    Parameters
-    ----------
-    length : int
-        Samples of the block.
-
-    Returns
-    -------
-    nodes : ndarray of int, shape (n_nodes,)
-    expand : ndarray, shape (length, n_nodes)
-        Lagrange's polynomials of the nodes at all samples.
-
-    Examples
-    --------
-    >>> nodes, expand = expansion(32)
-    >>> x = np.arange(32.0)
-    >>> bool(np.abs(expand @ nodes**3.0 - x**3).max() < 1e-9)
-    True
+    Samples at the rim of a block have no neighbours in it, so that blocks overlap by two.
     """
-    angle = np.pi * (2 * np.arange(_NODES) + 1) / (2 * _NODES)
-    stretch = np.cos(np.pi / (2 * _NODES))  # the outermost nodes are the first and the last sample
-    nodes = np.rint((1 - np.cos(angle) / stretch) / 2 * (length - 1)).astype(np.int64)
-    place = np.arange(length)
-    expand = np.ones((length, _NODES))
-    for k, node in enumerate(nodes):
-        others = np.delete(nodes, k)
-        expand[:, k] = np.prod((place[:, None] - others) / (node - others), axis=1)
-    return nodes, expand
-
-
-@dataclass(frozen=True)
-class AxisBlocks:
-    r"""Node rows of all blocks of an axis, and what bounds their interpolation.
-
-    Attributes
-    ----------
-    start : ndarray of int, shape (n_blocks,)
-        First sample of every block; the last ones may overlap.
-    first, width : ndarray of int, shape (n_blocks, n_blurs)
-        First column of the source, and columns, of every block and blur.
-    offset : ndarray of int, shape (n_blocks, n_blurs)
-        Where the entries of a block's node rows begin, row by row.
-    entries : ndarray
-        Node rows of all blocks and blurs.
-    smooth, rough, norm, residual : ndarray, shape (n_blocks, n_blurs)
-        Largest :math:`\|R_0'\|_1`, :math:`\|Q\|_1`, :math:`\|L\|_1` and
-        :math:`\|R\|_1` of a row.
-    """
-
-    start: NDArray[np.int64]
-    first: NDArray[np.int64]
-    width: NDArray[np.int64]
-    offset: NDArray[np.int64]
-    entries: NDArray[np.float64]
-    smooth: NDArray[np.float64]
-    rough: NDArray[np.float64]
-    norm: NDArray[np.float64]
-    residual: NDArray[np.float64]
-
-
-def axis_blocks(axis: SplineAxis | _From, n_samples: int, length: int, step: int) -> AxisBlocks:
-    """Evaluate the rows of all blocks of an axis, keep those of the nodes, bound the others.
-
-    Parameters
-    ----------
-    axis : SplineAxis
-        The axis.
-    n_samples : int
-        Samples of this octave along the axis, at least `length`.
-    length, step : int
-        Samples of a block, and from one block to the next.
-    """
-    nodes, expand = expansion(length)
-    starts = np.minimum(np.arange(0, max(n_samples - length, 0) + step, step), n_samples - length)
-    starts = np.unique(starts)
-    n_blurs = axis.rows.reach.size
-    shape = (starts.size, n_blurs)
-    first, width, offset = (np.zeros(shape, dtype=np.int64) for _ in range(3))
-    bounds = [np.zeros(shape) for _ in range(4)]
-    entries, size = [], 0
-    for i, start in enumerate(starts):
-        block = axis.block(int(start), int(start) + length)
-        for blur in range(n_blurs):
-            rows = block.factor(blur)
-            kept = np.ascontiguousarray(rows[nodes])
-            first[i, blur], width[i, blur] = block.first[blur], rows.shape[1]
-            offset[i, blur] = size
-            size += kept.size
-            entries.append(kept.ravel())
-            for bound, value in zip(bounds, _row_bounds(rows, rows - expand @ kept), strict=True):
-                bound[i, blur] = value
-    return AxisBlocks(starts, first, width, offset, np.concatenate(entries), *bounds)
-
-
-def _row_bounds(
-    rows: NDArray[np.float64], residual: NDArray[np.float64]
-) -> tuple[float, float, float, float]:
-    """Norms of `AxisBlocks` for the rows of one block and blur."""
-    n_columns = rows.shape[1]
-    norm = float(np.abs(rows).sum(axis=1).max())
-    size = float(np.abs(residual).sum(axis=1).max())
-    if n_columns < 8:
-        return 0.0, size, norm, size
-    middle = n_columns // 2 - 2
-    place = np.arange(n_columns) - (middle + 1.5)
-    powers = place[None, :] ** np.arange(4)[:, None]
-    moments = residual @ powers.T
-    split = np.linalg.solve(powers[:, middle : middle + 4], moments.T).T
-    annihilating = residual.copy()
-    annihilating[:, middle : middle + 4] -= split
-    for _ in range(4):
-        annihilating = np.cumsum(annihilating, axis=1)
-    smooth = float(np.abs(annihilating[:, :-4]).sum(axis=1).max())
-    # What the sums do not bring to zero at the end is rounding, and counted with the rough part.
-    left = np.abs(annihilating[:, -4:]).sum(axis=1)
-    rough = float((np.abs(split).sum(axis=1) + 16 * left).max())
-    return smooth, rough, norm, size
+    starts = np.minimum(np.arange(0, n_samples - 2, length - 2), n_samples - length)
+    return tuple(int(start) for start in np.unique(starts))
 
 
 def error_bounds(
@@ -248,57 +132,6 @@ def _local_maxima(
     return np.stack([bands[:, a:b].max(axis=1, initial=0.0) for a, b in columns], axis=1)
 
 
-@lru_cache(maxsize=4)
-def _blocks_of(axis: SplineAxis, n_samples: int, length: int, step: int) -> AxisBlocks:
-    return axis_blocks(axis, n_samples, length, step)
-
-
-class WholeRows(NamedTuple):
-    """All rows of blocks for some blurs, for compiled code.
-
-    Attributes
-    ----------
-    first, width, offset : ndarray of int, shape (n_blocks, n_blurs)
-        First column of the source, columns, and where the entries begin.
-    entries : ndarray
-        Rows of all blocks and blurs, row by row.
-    length : int
-        Rows of a block.
-    """
-
-    first: NDArray[np.int64]
-    width: NDArray[np.int64]
-    offset: NDArray[np.int64]
-    entries: NDArray[np.float64]
-    length: int
-
-    def rows(self, block: int, blur: int) -> tuple[NDArray[np.float64], int]:
-        """Rows of one block and blur, and their first column."""
-        width, start = self.width[block, blur], self.offset[block, blur]
-        rows = self.entries[start : start + self.length * width].reshape(self.length, width)
-        return rows, int(self.first[block, blur])
-
-
-@lru_cache(maxsize=8)
-def _whole_rows(
-    axis: SplineAxis, starts: tuple[int, ...], length: int, blurs: tuple[int, ...]
-) -> WholeRows:
-    first, width, offset = (np.zeros((len(starts), len(blurs)), dtype=np.int64) for _ in range(3))
-    entries, size = [np.empty(0)], 0
-    for i, start in enumerate(starts):
-        block = axis.block(start, start + length)
-        for k, blur in enumerate(blurs):
-            rows = block.factor(blur)
-            first[i, k], width[i, k], offset[i, k] = block.first[blur], rows.shape[1], size
-            size += rows.size
-            entries.append(rows.ravel())
-    return WholeRows(first, width, offset, np.concatenate(entries), length)
-
-
-def _in_single_precision(rows: WholeRows) -> WholeRows:
-    return rows._replace(entries=rows.entries.astype(np.float32))
-
-
 class InterpolatedSearch:
     """Candidates for extrema of a scale-space, one column of blocks at a time.
 
@@ -315,28 +148,21 @@ class InterpolatedSearch:
         length = self.length = block_length(space)
         y_axis, x_axis = space.axes
         assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
-        # Samples at the rim of a block have no neighbours in it, so that blocks overlap.
-        self.y_blocks = _blocks_of(y_axis, space.shape[1], length, length - 2)
         self.abreast = _ABREAST * length
-        x_starts = np.unique(
-            np.minimum(
-                np.arange(0, space.shape[2] - 2, self.abreast - 2),
-                space.shape[2] - self.abreast,
-            )
-        )
-        self.x_starts = x_starts
-        self.x_blocks = _abreast_blocks(x_axis, tuple(int(s) for s in x_starts), length)
+        y_starts = starts_of(space.shape[1], length)
+        self.x_starts = starts_of(space.shape[2], self.abreast)
+        each = tuple(start + k * length for start in self.x_starts for k in range(_ABREAST))
+        self.y_blocks = axis_blocks(y_axis, y_starts, length)
+        self.x_blocks = axis_blocks(x_axis, each, length)
         self.bounds = error_bounds(space, self.y_blocks, self.x_blocks)
         blurs, lower, upper = space.blurs
         self.n_kinked = int((blurs[lower] < _KINKED).sum())  # the first slices
         self.bounds[:, :, : self.n_kinked] = 0.0
         kinked = np.unique([lower[: self.n_kinked], upper[: self.n_kinked]])
         self.kinked = tuple(int(blur) for blur in kinked)
-        y_starts = tuple(int(start) for start in self.y_blocks.start)
-        self.y_rows = _in_single_precision(_whole_rows(y_axis, y_starts, length, self.kinked))
-        self.x_rows = _whole_rows(
-            x_axis, tuple(int(start) for start in x_starts), self.abreast, self.kinked
-        )
+        rows = whole_rows(y_axis, y_starts, length, self.kinked)
+        self.y_rows = rows._replace(entries=rows.entries.astype(np.float32))
+        self.x_rows = whole_rows(x_axis, self.x_starts, self.abreast, self.kinked)
 
     @property
     def n_columns(self) -> int:
@@ -402,40 +228,10 @@ class InterpolatedSearch:
         )
         parts = [found[256 * i : 256 * i + count] for i, count in enumerate(counts) if count <= 256]
         undecided = [
-            (int(self.y_blocks.start[i]), int(self.x_starts[column]))
+            (int(self.y_blocks.start[i]), self.x_starts[column])
             for i in np.flatnonzero(counts > 256)
         ]
         return np.concatenate([np.empty((0, 4), dtype=np.int64), *parts]), undecided
-
-
-@lru_cache(maxsize=4)
-def _abreast_blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisBlocks:
-    """Blocks of the x axis, `_ABREAST` of them beside each other from each start on."""
-    parts = [axis_blocks(_From(axis, start), _ABREAST * length, length, length) for start in starts]
-    offsets = np.cumsum([0, *(part.entries.size for part in parts)])
-    return AxisBlocks(
-        np.concatenate([part.start + start for part, start in zip(parts, starts, strict=True)]),
-        np.concatenate([part.first for part in parts]),
-        np.concatenate([part.width for part in parts]),
-        np.concatenate(
-            [part.offset + more for part, more in zip(parts, offsets[:-1], strict=True)]
-        ),
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("entries", "smooth", "rough", "norm", "residual")
-        ),
-    )
-
-
-class _From:
-    """An axis from one of its samples on."""
-
-    def __init__(self, axis: SplineAxis, start: int) -> None:
-        self.axis, self.start, self.rows = axis, start, axis.rows
-
-    def block(self, start: int, stop: int) -> Block:
-        """See `AxisOperator.block`."""
-        return self.axis.block(self.start + start, self.start + stop)
 
 
 @njit(cache=True, nogil=True)

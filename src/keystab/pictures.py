@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from keystab.errors import InputError
 from keystab.files import check_writable, written_whole
 
-__all__ = ["FORMATS", "picture_shape", "pixel_digest", "read_picture", "write_picture"]
+__all__ = [
+    "FORMATS",
+    "picture_shape",
+    "pixel_digest",
+    "read_picture",
+    "read_with_digest",
+    "write_picture",
+]
 
 #: Suffixes of the files that pictures are written to.
 FORMATS = (".png", ".tif", ".tiff", ".npy")
@@ -71,9 +78,14 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.float64]:
            [0.6, 0.8, 1. ]])
     """
     path = Path(path)
-    grey = _grey(_decode(path), path)
-    _require_finite(grey, path)
-    return grey
+    return _finite_grey(_decode(path), path)
+
+
+def read_with_digest(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], str]:
+    """Read a picture as `read_picture` does, and its `pixel_digest`, from one decoding."""
+    path = Path(path)
+    pixels = _decode(path)
+    return _finite_grey(pixels, path), _digest(pixels)
 
 
 def picture_shape(path: str | os.PathLike[str]) -> tuple[int, int]:
@@ -133,7 +145,10 @@ def pixel_digest(path: str | os.PathLike[str]) -> str:
     InputError
         If the file cannot be decoded; see `read_picture`.
     """
-    pixels = _decode(Path(path))
+    return _digest(_decode(Path(path)))
+
+
+def _digest(pixels: NDArray[Any]) -> str:
     little = np.ascontiguousarray(pixels.astype(pixels.dtype.newbyteorder("<"), copy=False))
     return hashlib.sha256(little.data).hexdigest()
 
@@ -302,6 +317,12 @@ def _decode_by_pillow(path: Path, mode: str) -> NDArray[Any]:
     # Pillow would hand over ink densities (CMYK) or Lab as if they were colours.
     convert = {"mode": "RGB"} if mode in {"CMYK", "YCbCr", "LAB", "HSV"} else {}
     return np.asarray(iio.imread(path, plugin="pillow", index=0, **convert))
+
+
+def _finite_grey(pixels: NDArray[Any], path: Path) -> NDArray[np.float64]:
+    grey = _grey(pixels, path)
+    _require_finite(grey, path)
+    return grey
 
 
 def _grey(pixels: NDArray[Any], path: Path) -> NDArray[np.float64]:

@@ -9,13 +9,17 @@ neighbours; its extremum lies at ``alpha = -H^{-1} g`` grid steps. It is accepte
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
 from keystab import checks
-from keystab.dog_space import ScaleSpace
 from keystab.errors import InputError
 from keystab.sampling import Sampling
+
+if TYPE_CHECKING:
+    from keystab.dog_space import ScaleSpace
 
 MOVES = ("nearest", "unit_step")
 
@@ -243,3 +247,28 @@ def _check(move: str, max_offset: float, max_models: int) -> None:
         raise InputError(f"move is {move!r}, allowed are {' and '.join(MOVES)}: change move")
     checks.limit("max_offset", max_offset, above=0)
     checks.integer("max_models", max_models, least=1)
+
+
+def refined_keypoints(
+    extrema: pd.DataFrame, traces: pd.DataFrame, max_offset: float, max_iterations: float
+) -> pd.DataFrame:
+    """Keypoints that a refinement accepts.
+
+    Parameters
+    ----------
+    extrema, traces : DataFrame
+        Of one or several views; ``keypoint`` is the row in `extrema`.
+    max_offset, max_iterations : float
+        M_offset and N_interp.
+
+    Returns
+    -------
+    DataFrame
+        The rows of `extrema` of the accepted ones, in the same order, with the refined ``y, x,
+        sigma, value``.
+    """
+    good = accepted(traces, max_offset, max_iterations).sort_values("keypoint")
+    table = extrema.iloc[good["keypoint"].to_numpy()].reset_index(drop=True)
+    for name in ("y", "x", "sigma", "value"):
+        table[name] = good[name].to_numpy()
+    return table

@@ -64,7 +64,8 @@ def checked(given: Settings, schema: Schema) -> Settings:
     Parameters
     ----------
     given : dict
-        Settings as read; anything left out takes its default.
+        Settings as read; anything left out takes its default. Of settings whose entries have names
+        of the reader's own, entries that are null are left out.
     schema : dict
         What is allowed, as read from ``workflow/schemas/config.schema.yaml``.
 
@@ -78,14 +79,36 @@ def checked(given: Settings, schema: Schema) -> Settings:
     InputError
         With one line per problem.
     """
-    refuse(schema_problems(given, schema))
-    return completed(given, schema)
+    kept = without_null_entries(given, schema)
+    refuse(schema_problems(kept, schema))
+    return completed(kept, schema)
 
 
 def refuse(problems: Sequence[str]) -> None:
     """Raise an `InputError` of one line per problem, if there is any."""
     if problems:
         raise InputError("\n".join(f"config: {problem}" for problem in problems))
+
+
+def without_null_entries(given: Any, schema: Schema) -> Any:
+    """Settings without the null entries of blocks in which the reader chooses the names.
+
+    An overlay cannot take away what another file gives; null takes its place.
+
+    Examples
+    --------
+    >>> schema = {"type": "object", "additionalProperties": {"type": "object"}}
+    >>> without_null_entries({"a": {}, "b": None}, schema)
+    {'a': {}}
+    """
+    if schema.get("type") != "object" or not isinstance(given, Mapping):
+        return given
+    known, others = schema.get("properties", {}), schema.get("additionalProperties", False)
+    return {
+        key: without_null_entries(value, known.get(key, others or {}))
+        for key, value in given.items()
+        if key in known or value is not None or not isinstance(others, Mapping)
+    }
 
 
 def completed(given: Any, schema: Schema) -> Any:

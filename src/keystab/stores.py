@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Sampled",
     "StoredScaleSpace",
+    "StoredViews",
     "attributes_of",
     "open_scale_space",
     "open_views",
@@ -338,8 +340,49 @@ def view(views: xr.Dataset, k: int) -> NDArray[np.float64]:
     if not 0 <= k < views.sizes["view"]:
         raise InputError(f"there is no view {k}; the set has views 0 to {views.sizes['view'] - 1}")
     one = views["image"][k, : int(views["height"][k]), : int(views["width"][k])]
-    try:
+    with _damage_named(k):
         return one.to_numpy().astype(np.float64)
+
+
+class StoredViews:
+    """A stored set of views as arrays, for jobs that cannot wait for the import of xarray.
+
+    Parameters
+    ----------
+    path : path
+        Folder that `write_views` wrote.
+
+    Attributes
+    ----------
+    attributes : dict
+        Of the store.
+    columns : dict of ndarray, shape (n_views,)
+        Coordinates of the views; see `open_views`.
+
+    Raises
+    ------
+    InputError
+        If there is no such store, or views are missing from it.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        group, _ = open_group(path, "views")
+        self.attributes: dict[str, Any] = dict(group.attrs)
+        self._image = open_array(group, "image")
+        names = self._image.attrs["coordinates"]
+        self.columns = {name: np.asarray(open_array(group, name)[:]) for name in str(names).split()}
+
+    def __getitem__(self, k: int) -> NDArray[np.float64]:
+        """Return what `view` returns."""
+        height, width = (int(self.columns[name][k]) for name in ("height", "width"))
+        with _damage_named(k):
+            return np.asarray(self._image[k, :height, :width], dtype=np.float64)
+
+
+@contextmanager
+def _damage_named(k: int) -> Iterator[None]:
+    try:
+        yield
     except ValueError as error:
         raise InputError(
             f"view {k} is damaged ({error}); delete the store, make it again"

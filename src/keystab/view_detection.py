@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from keystab.detection import extrema_table, without_seams
 from keystab.dog_space import ScaleSpace, scale_space
 from keystab.extrema import discrete_extrema
-from keystab.refinement import accepted, positions, trace
+from keystab.refinement import positions, trace
 
 Search = Callable[[ScaleSpace, int], NDArray[np.int64]]
 """Finds the discrete extrema of an octave, given its scale-space and its number."""
@@ -114,28 +114,3 @@ def detect_in_view(
         followed.append(models.assign(keypoint=number[keypoint])[mask[keypoint]])
         first += int(mask.sum())
     return pd.concat(kept, ignore_index=True), pd.concat(followed, ignore_index=True)
-
-
-def refined_keypoints(
-    extrema: pd.DataFrame, traces: pd.DataFrame, max_offset: float, max_iterations: float
-) -> pd.DataFrame:
-    """Keypoints that a refinement accepts.
-
-    Parameters
-    ----------
-    extrema, traces : DataFrame
-        Of one or several views; ``keypoint`` is the row in `extrema`.
-    max_offset, max_iterations : float
-        M_offset and N_interp.
-
-    Returns
-    -------
-    DataFrame
-        The rows of `extrema` of the accepted ones, in the same order, with the refined ``y, x,
-        sigma, value``.
-    """
-    good = accepted(traces, max_offset, max_iterations).sort_values("keypoint")
-    table = extrema.iloc[good["keypoint"].to_numpy()].reset_index(drop=True)
-    for name in ("y", "x", "sigma", "value"):
-        table[name] = good[name].to_numpy()
-    return table

@@ -11,8 +11,9 @@ from scenes import blob
 
 from keystab.errors import InputError
 from keystab.kappa_tables import common_normalised_scales, kappa_tables
+from keystab.refinement import refined_keypoints
 from keystab.shipped import passes_filters
-from keystab.view_detection import Detector, detect_in_view, refined_keypoints
+from keystab.view_detection import Detector, detect_in_view
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
 KAPPAS = [2 ** (1 / 30), 2 ** (1 / 6), 2**0.5]

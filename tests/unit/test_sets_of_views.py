@@ -15,7 +15,8 @@ from scipy import ndimage
 from keystab.camera import Scene, simulate
 from keystab.detection import detect_keypoints
 from keystab.duplicates import matched
-from keystab.view_detection import Detector, detect_in_view, refined_keypoints
+from keystab.refinement import refined_keypoints
+from keystab.view_detection import Detector, detect_in_view
 from keystab.view_sets import (
     common_scales,
     expanded,

@@ -90,6 +90,15 @@ def setting(place):
     return value_of
 
 
+onstart:
+    # Snakemake 9 limits the rate at which jobs start to 100 a second, and for that wakes up once a
+    # second more for every job that has finished: after a hundred it takes a good part of a core.
+    # Jobs here take seconds, so that nothing is lost without the limit.
+    _limit = getattr(workflow.scheduler, "job_rate_limiter", None)
+    if _limit is not None and (_limit.max_jobs, _limit.timespan) == (100, 1):
+        workflow.scheduler.job_rate_limiter = None
+
+
 wildcard_constraints:
     set="[a-z][a-z0-9_]*",
     n_spo="[0-9]+",

@@ -17,14 +17,14 @@ rule detect_variant:
     benchmark:
         f"{LOGS}/benchmarks/detect_variant/{{variant}}.tsv"
     wildcard_constraints:
-        variant=one_of(VARIANTS),
+        variant=one_of(sorted({run_of_variant(name) for name in VARIANTS})),
     params:
         n_spo=setting("samplings.n_spo"),
         sigma_min=setting("detector.sigma_min"),
         kappa=setting("detector.kappa"),
         oversampling=setting("floor.variants.{variant}.oversampling"),
-        epsilon=setting("floor.variants.{variant}.epsilon"),
-        grey_range=setting("floor.variants.{variant}.grey_range"),
+        epsilon=of_single_precision("epsilon"),
+        grey_range=of_single_precision("grey_range"),
         arithmetic=setting("floor.variants.{variant}.arithmetic"),
         bits=setting("floor.variants.{variant}.bits"),
         code=fingerprint("keystab.stages.detect_variant"),
@@ -54,7 +54,7 @@ rule match_variants:
     input:
         views=ancient(files_of_variants(f"{RESULTS}/views/{{set}}")),
         digest=files_of_variants(f"{RESULTS}/views/{{set}}.sha256"),
-        extrema=expand(f"{RESULTS}/keypoints/floor/{{variant}}.parquet", variant=VARIANTS),
+        extrema=[f"{RESULTS}/keypoints/floor/{run_of_variant(name)}.parquet" for name in VARIANTS],
     output:
         rates=f"{RESULTS}/tables/floor_rates.csv",
         summary=f"{RESULTS}/tables/floor_summary.csv",
@@ -64,6 +64,7 @@ rule match_variants:
         f"{LOGS}/benchmarks/match_variants.tsv"
     params:
         names=Named("floor.variants", VARIANTS),
+        tolerances=Named("tolerances", [tolerance_of_variant(name) for name in VARIANTS]),
         n_spo=setting("samplings.n_spo"),
         settles_at=setting("floor.settles_at"),
         sigma_min=setting("detector.sigma_min"),
@@ -85,6 +86,7 @@ rule match_variants:
             --views-digest {input.digest:q} \
             --extrema {input.extrema:q} \
             --names {params.names} \
+            --tolerances {params.tolerances} \
             --n-spo {params.n_spo} \
             --settles-at {params.settles_at} \
             --sigma-min {params.sigma_min} \

@@ -174,6 +174,41 @@ def digest_of_variant(wildcards):
     return f"{RESULTS}/views/{name}.sha256"
 
 
+def run_of_variant(name):
+    """First of the variants whose extrema are the same but for the tolerance, which comes later.
+
+    Single precision rounds in units of its own grey range, so that its variants stand alone.
+    """
+    variants = config["floor"]["variants"]
+    if variants[name]["arithmetic"] == "float32":
+        return name
+    kept = ("set", "oversampling", "arithmetic", "bits")
+    return next(
+        other
+        for other, variant in variants.items()
+        if all(variant[key] == variants[name][key] for key in kept)
+    )
+
+
+def of_single_precision(key):
+    """Parameter with a setting of a variant that only single precision uses; elsewhere that of no tolerance."""
+
+    def value_of(wildcards):
+        variant = config["floor"]["variants"][wildcards.variant]
+        usual = {"epsilon": 0.0, "grey_range": 1.0}[key]
+        value = variant[key] if variant["arithmetic"] == "float32" else usual
+        return Named(f"floor.variants.{wildcards.variant}.{key}", value)
+
+    return value_of
+
+
+def tolerance_of_variant(name):
+    """Least difference of a variant's extrema, of grey values in [0, 1]; -1 where it was applied."""
+    variant = config["floor"]["variants"][name]
+    applied = variant["arithmetic"] == "float32"
+    return -1.0 if applied else variant["epsilon"] / variant["grey_range"]
+
+
 def files_of_variants(path):
     """Files of the views that the variants search, one per variant."""
     sets = [variant["set"] for variant in config["floor"]["variants"].values()]

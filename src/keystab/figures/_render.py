@@ -78,8 +78,11 @@ def check_tables(tables: Tables, needs: Needs) -> None:
             )
 
 
-def save(figure: Figure, path: Path | str) -> None:
+def save(figure: Figure, path: Path | str, draft: bool = False) -> None:
     """Write a figure as PDF or PNG by the ending of `path`; complete or not at all.
+
+    Drafts have their letters as shapes, which is quicker to write than the fonts that journals ask
+    for.
 
     Raises
     ------
@@ -91,7 +94,7 @@ def save(figure: Figure, path: Path | str) -> None:
     if kind not in _METADATA:
         raise InputError(f"{path}: a figure is written as .pdf or .png; change the ending")
     try:
-        with style.context(), written_whole(path) as part:
+        with style.context(draft), written_whole(path) as part:
             figure.savefig(part, format=kind, metadata=_METADATA[kind])
     except OSError as error:
         reason = error.strerror or error
@@ -129,7 +132,7 @@ def main(
         tables = read_tables(args.tables, needs)
         figure = draw(tables, args.draft)
         for path in filter(None, (args.pdf, args.png)):
-            save(figure, path)
+            save(figure, path, args.draft)
             print(f"wrote {path}")
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -144,7 +144,7 @@ def _end_text(ax: Axes, label: EndLabel, text: str, leader: bool = False) -> Any
         ha="left",
         va="center",
         annotation_clip=False,
-        arrowprops=line | {"shrinkA": 0.0, "shrinkB": 0.0} if leader else None,
+        arrowprops=line | {"patchA": None, "shrinkA": 2.0, "shrinkB": 0.0} if leader else None,
     )
 
 

@@ -196,7 +196,8 @@ def label_ends(
                 "arrowstyle": "-",
                 "color": colour,
                 "linewidth": 0.5,
-                "shrinkA": 0.0,
+                "patchA": None,  # to find where a line leaves the text's box takes seconds
+                "shrinkA": 2.0,
                 "shrinkB": 0.0,
                 "relpos": (0.0, 0.5),
             },

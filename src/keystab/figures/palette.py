@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
@@ -88,6 +89,12 @@ ASSUMED_COLOURS = {"below": "#D55E00", "right": INK, "above": "#0072B2"}
 """An assumed blur below, equal to and above that of the camera (figure S4)."""
 
 
+_SHADES = (
+    "#60ceac", "#40b7ad", "#359eaa", "#3485a5", "#366ca0", "#3d5195", "#403a76", "#36274d", "#251729",
+)  # fmt: skip
+"""Ordered quantities, from light to dark: seaborn's "mako", which takes seconds to import."""
+
+
 def shade(share: float) -> tuple[float, float, float]:
     """Return the colour of an ordered quantity: light at 0, dark at 1.
 
@@ -96,10 +103,7 @@ def shade(share: float) -> tuple[float, float, float]:
     >>> bool(sum(shade(0.0)) > sum(shade(0.5)) > sum(shade(1.0)))
     True
     """
-    import seaborn
-
-    red, green, blue = seaborn.color_palette("mako_r", as_cmap=True)(0.2 + 0.7 * share)[:3]
-    return red, green, blue
+    return _between(_SHADES, np.linspace(0.0, 1.0, len(_SHADES)), share)
 
 
 def n_spo_colour(n_spo: int, lowest: int = 3, highest: int = 19) -> tuple[float, float, float]:
@@ -134,11 +138,18 @@ def offset_colour(max_offset: float) -> tuple[float, float, float]:
     >>> offset_colour(0.6) == to_rgb(DETECTION_COLOURS["refined"])
     True
     """
+    stops = (0.0, 0.5 / 1.0, 0.5 / 0.6, 1.0)  # of 0.5 / max_offset
+    return _between(_OFFSETS, stops, 0.5 / max_offset)
+
+
+def _between(
+    colours: Sequence[str], stops: Sequence[float] | NDArray[np.float64], place: float
+) -> tuple[float, float, float]:
+    """Return the colour at a place between colours at given stops."""
     from matplotlib.colors import to_rgb
 
-    stops = (0.0, 0.5 / 1.0, 0.5 / 0.6, 1.0)  # of 0.5 / max_offset
-    channels = zip(*map(to_rgb, _OFFSETS), strict=True)
-    red, green, blue = (float(np.interp(0.5 / max_offset, stops, one)) for one in channels)
+    channels = zip(*map(to_rgb, colours), strict=True)
+    red, green, blue = (float(np.interp(place, stops, channel)) for channel in channels)
     return red, green, blue
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from keystab.comparison import comparable
 from keystab.errors import InputError
 from keystab.seals import verify
-from keystab.stores import attributes_of, open_views, view
+from keystab.stores import StoredViews
 from keystab.tables import read_table
 from keystab.view_sets import common_scales
 from keystab.view_tables import CommonRange
@@ -49,34 +49,29 @@ class Views:
     """
 
     def __init__(self, store: Path) -> None:
-        self._views = open_views(store)
-        self._attributes = attributes_of(store)
+        self._views = StoredViews(store)
 
     def __len__(self) -> int:
-        return int(self._views.sizes["view"])
+        return len(self._views.columns["blur"])
 
     def __iter__(self) -> Iterator[View]:
         return (self[number] for number in range(len(self)))
 
     def __getitem__(self, number: int) -> View:
-        blur, step = (float(self._views[name][number]) for name in ("blur", "step"))
-        own = effective_blur(blur, step, self._attributes["reference_blur"])
-        return View(view(self._views, number), own)
+        blur, step = (float(self._views.columns[name][number]) for name in ("blur", "step"))
+        own = effective_blur(blur, step, self._views.attributes["reference_blur"])
+        return View(self._views[number], own)
 
     @property
     def reference_shape(self) -> tuple[int, int]:
         """Height and width of the reference in pixels."""
-        height, width = self._attributes["reference_shape"]
+        height, width = self._views.attributes["reference_shape"]
         return height, width
 
     @property
     def specs(self) -> list[ViewSpec]:
         """How each view was taken."""
-        numbers = {
-            name: self._views[name].to_numpy().tolist()
-            for name in ("blur", "step", "height", "width", "shift_y", "shift_x", "rotation")
-        }
-        noise = self._views["noise"].to_numpy().tolist()
+        numbers = {name: values.tolist() for name, values in self._views.columns.items()}
         return [
             ViewSpec(
                 numbers["blur"][k],
@@ -84,8 +79,8 @@ class Views:
                 (numbers["height"][k], numbers["width"][k]),
                 (numbers["shift_y"][k], numbers["shift_x"][k]),
                 numbers["rotation"][k],
-                noise[k],
-                (str(self._attributes["set"]), k),
+                numbers["noise"][k],
+                (str(self._views.attributes["set"]), k),
             )
             for k in range(len(self))
         ]

@@ -1,4 +1,8 @@
-"""Detect the extrema of all balanced samplings in one variant of the arithmetic (figure floor)."""
+"""Detect the extrema of all balanced samplings in one variant of the arithmetic (figure floor).
+
+In double precision no tolerance is applied: the table says by how much each extremum differs from
+its neighbours, so that any is chosen afterwards.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +19,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.views_arguments(parser)
     _run.required(parser, "n-spo", "scales per octave of the samplings", type=int, nargs="+")
     _run.detector_arguments(parser)
-    _run.required(parser, "epsilon", "least difference to the 26 neighbours", type=float)
-    _run.required(parser, "grey-range", "largest grey value", type=float)
     _run.required(parser, "arithmetic", "type of samples", choices=("float64", "float32"))
+    _run.required(parser, "epsilon", "least difference in single precision", type=float)
+    _run.required(parser, "grey-range", "largest grey value in single precision", type=float)
     _run.required(parser, "bits", "bits of a pixel; None for floats", type=_run.optional(int))
     _run.required(parser, "extrema", "table of extrema to write", type=Path)
     args = parser.parse_args(argv)
@@ -47,8 +51,9 @@ def main(argv: Sequence[str] | None = None) -> None:
         if args.arithmetic == "float32":
             found = single_precision_extrema(space, args.epsilon, args.grey_range)
         else:
-            found = discrete_extrema(space, args.epsilon / args.grey_range)
-        table = extrema_table(space, found)[["y", "x", "sigma", "value", "sign", "step_sigma"]]
+            found = discrete_extrema(space)
+        columns = ["y", "x", "sigma", "value", "sign", "step_sigma", "difference"]
+        table = extrema_table(space, found)[columns]
         table.insert(0, "n_spo", n_spo)
         table.insert(1, "delta_min", space.sampling.delta_min)
         parts.append(table)

@@ -26,9 +26,9 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.blur_tables import blur_error_table
     from keystab.errors import InputError
+    from keystab.refinement import refined_keypoints
     from keystab.stages._inputs import common_range, read_views, same_options
     from keystab.tables import read_table, write_table
-    from keystab.view_detection import refined_keypoints
 
     views = read_views(args.views, args.views_digest)
     blurs = [spec.blur for spec in views.specs]

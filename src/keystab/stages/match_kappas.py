@@ -27,9 +27,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     args = parser.parse_args(argv)
 
     from keystab.kappa_tables import kappa_tables
+    from keystab.refinement import refined_keypoints
     from keystab.stages._inputs import read_view, same_options
     from keystab.tables import read_table, write_table
-    from keystab.view_detection import refined_keypoints
 
     view = read_view(args.views, args.views_digest)
     keypoints = refined_keypoints(

@@ -27,10 +27,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
+    from keystab.refinement import refined_keypoints
     from keystab.shipped import passes_filters
     from keystab.stages._inputs import common_range, read_views, same_options
     from keystab.tables import read_table, write_table
-    from keystab.view_detection import refined_keypoints
     from keystab.view_tables import count_table, curve_table, match_views
 
     views = read_views(args.views, args.views_digest)

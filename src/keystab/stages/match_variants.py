@@ -16,6 +16,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "views-digest", "their seals", type=Path, nargs="+")
     _run.required(parser, "extrema", "extrema of each variant", type=Path, nargs="+")
     _run.required(parser, "names", "names of the variants", nargs="+")
+    least = "least difference to the 26 neighbours in each variant, of grey values in [0, 1]"
+    _run.required(parser, "tolerances", least, type=float, nargs="+")
     _run.required(parser, "n-spo", "scales per octave of the samplings", type=int, nargs="+")
     _run.required(parser, "settles-at", "n_spo from which rates are averaged", type=int)
     _run.scale_arguments(parser)
@@ -36,10 +38,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     same = same_options(args)
     steps = {n_spo: balanced_delta(n_spo, args.kappa, args.sigma_min) for n_spo in args.n_spo}
     rates, summaries = [], []
-    for name, store, digest, path in zip(
-        args.names, args.views, args.views_digest, args.extrema, strict=True
+    for name, tolerance, store, digest, path in zip(
+        args.names, args.tolerances, args.views, args.views_digest, args.extrema, strict=True
     ):
         extrema = read_table(path)
+        extrema = extrema[extrema["difference"] > tolerance].reset_index(drop=True)
         common = comparable_only(extrema, read_view(store, digest).shape, args)
         counts = change_counts(extrema, common, steps, same)
         stability = match_samplings(common, args.n_spo, same).keypoints["stability"]

@@ -35,18 +35,18 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.camera import Scene, simulate
     from keystab.errors import InputError
-    from keystab.pictures import pixel_digest, read_picture
+    from keystab.pictures import read_with_digest
     from keystab.seals import write_seal
     from keystab.stores import write_views
     from keystab.view_sets import view_specs
 
-    digest = pixel_digest(args.reference)
+    picture, digest = read_with_digest(args.reference)
     if args.reference_sha256 not in (None, digest):
         raise InputError(
             f"{args.reference} is not the picture that the config means: its pixels have the "
             f"SHA-256 {digest}; for this picture write reference_sha256: {digest} or null"
         )
-    scene = Scene(read_picture(args.reference))
+    scene = Scene(picture)
     specs = view_specs(args.set, vars(args), scene.shape)
     attributes = {
         "set": args.set,
