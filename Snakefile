@@ -45,9 +45,12 @@ include: "workflow/rules/figures.smk"  # tables -> figures
 #   figS3 the blur of a real camera                             figS3*.csv
 #   figS4 blobs, whose scale is known                           figS4.csv
 #   floor why extrema come and go at any density                floor_*.csv
+#   truth detections against the true extrema                   truth_*.csv
+#   refinement what it keeps and loses of the true extrema      refinement_choices.csv
 FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6"]
 FIGURES += ["fig7", "fig8", "fig9", "fig10", "fig11", "fig12"]
-FIGURES += ["figS1", "figS2", "figS3", "figS4", "floor"]
+FIGURES += ["figS1", "figS2", "figS3", "figS4"]
+FIGURES += ["floor", "truth", "refinement"]
 
 
 rule all:

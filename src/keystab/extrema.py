@@ -34,7 +34,11 @@ BAND_ROWS = 8192
 
 
 def discrete_extrema(
-    space: ScaleSpace, epsilon: float = 0.0, threads: int = 1, show_progress: bool = False
+    space: ScaleSpace,
+    epsilon: float = 0.0,
+    threads: int = 1,
+    show_progress: bool = False,
+    window: tuple[slice, slice] | None = None,
 ) -> np.ndarray:
     """Find all discrete extrema of one octave, block by block.
 
@@ -49,6 +53,8 @@ def discrete_extrema(
         Blocks searched at once. The result does not depend on it.
     show_progress : bool
         Whether to report progress on standard error.
+    window : (slice, slice), optional
+        Rows and columns whose extrema are asked for; all by default.
 
     Returns
     -------
@@ -74,18 +80,45 @@ def discrete_extrema(
     what = f"extrema, n_spo {space.sampling.n_spo}" if show_progress else None
     with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
         search = _interpolated if interpolated_search.applies(space) else _evaluated
-        found = search(space, tolerance, pool, what)
-    extrema = np.concatenate([np.empty((0, 4), dtype=np.int64), *found])
+        found = search(space, tolerance, pool, what, inner_window(space, window))
+    extrema = within(np.concatenate([np.empty((0, 4), dtype=np.int64), *found]), window)
     return extrema[np.lexsort((extrema[:, 2], extrema[:, 1], extrema[:, 0]))]
 
 
+def inner_window(
+    space: ScaleSpace, window: tuple[slice, slice] | None = None
+) -> tuple[slice, slice]:
+    """Rows and columns of a window, or of all, that have neighbours on both sides."""
+    inner = tuple(slice(1, max(size - 1, 1)) for size in space.shape[1:])
+    if window is not None:
+        inner = tuple(
+            slice(max(asked.start, have.start), min(asked.stop, have.stop))
+            for asked, have in zip(window, inner, strict=True)
+        )
+    return inner[0], inner[1]
+
+
+def within(extrema: np.ndarray, window: tuple[slice, slice] | None) -> np.ndarray:
+    """Extrema of some rows and columns; all where there is no window."""
+    if window is None:
+        return extrema
+    inside = np.ones(len(extrema), dtype=bool)
+    for position, asked in zip(extrema[:, 1:3].T, window, strict=True):
+        inside &= (position >= asked.start) & (position < asked.stop)
+    return extrema[inside]
+
+
 def _evaluated(
-    space: ScaleSpace, tolerance: float, pool: ThreadPoolExecutor, what: str | None
+    space: ScaleSpace,
+    tolerance: float,
+    pool: ThreadPoolExecutor,
+    what: str | None,
+    window: tuple[slice, slice],
 ) -> list[np.ndarray]:
     """Extrema from all samples, evaluated block by block."""
     found: list[np.ndarray] = []
-    columns = list(ranges(1, space.shape[2] - 1, BLOCK_COLUMNS))
-    for top, bottom in ranges(1, space.shape[1] - 1, BAND_ROWS):
+    columns = list(ranges(window[1].start, window[1].stop, BLOCK_COLUMNS))
+    for top, bottom in ranges(window[0].start, window[0].stop, BAND_ROWS):
         rows = list(ranges(top, bottom, BLOCK_ROWS))
         along = list(pool.map(lambda r: space.axes[0].block(r[0] - 1, r[1] + 1), rows))
         searches = pool.map(partial(_search_column, space, rows, along, tolerance), columns)
@@ -94,10 +127,14 @@ def _evaluated(
 
 
 def _interpolated(
-    space: ScaleSpace, tolerance: float, pool: ThreadPoolExecutor, what: str | None
+    space: ScaleSpace,
+    tolerance: float,
+    pool: ThreadPoolExecutor,
+    what: str | None,
+    window: tuple[slice, slice],
 ) -> list[np.ndarray]:
     """Extrema from few samples and a bound on what lies between; see `interpolated_search`."""
-    search = interpolated_search.InterpolatedSearch(space, tolerance)
+    search = interpolated_search.InterpolatedSearch(space, tolerance, *window)
     searches = pool.map(partial(_search_interpolated, search), range(search.n_columns))
     found = list(progress(searches, search.n_columns, what) if what else searches)
     # Columns of blocks overlap by the samples that have no neighbours in one of them.

@@ -33,7 +33,7 @@ from keystab.operators import SplineAxis
 _LENGTH = 2.8
 
 # Blocks that one column of blocks is wide: its Gaussians, slices and samples stay in the cache.
-_ABREAST = 4
+_ABREAST = 6
 
 # Fewer samples than this per block gain nothing against evaluating all of them.
 _LEAST = 24
@@ -68,13 +68,14 @@ def block_length(space: ScaleSpace) -> int:
     return min(48, int(_LENGTH * sampling.sigma_min / sampling.delta_min))
 
 
-def starts_of(n_samples: int, length: int) -> tuple[int, ...]:
-    """First samples of the blocks of an axis; the last ends with it, and may overlap more.
+def starts_of(wanted: slice, n_samples: int, length: int) -> tuple[int, ...]:
+    """First samples of the blocks in which the wanted samples of an axis have both neighbours.
 
-    Samples at the rim of a block have no neighbours in it, so that blocks overlap by two.
+    Samples at the rim of a block have none, so that blocks overlap by two; the last may overlap
+    more where the axis ends.
     """
-    starts = np.minimum(np.arange(0, n_samples - 2, length - 2), n_samples - length)
-    return tuple(int(start) for start in np.unique(starts))
+    starts = np.arange(wanted.start - 1, max(wanted.stop - 1, wanted.start), length - 2)
+    return tuple(int(start) for start in np.unique(np.minimum(starts, n_samples - length)))
 
 
 def error_bounds(
@@ -141,16 +142,18 @@ class InterpolatedSearch:
         The octave, for which `applies` is true.
     tolerance : float
         By how much an extremum differs from each of its 26 neighbours.
+    rows, columns : slice
+        Samples that are asked for; others may be among the candidates.
     """
 
-    def __init__(self, space: ScaleSpace, tolerance: float) -> None:
+    def __init__(self, space: ScaleSpace, tolerance: float, rows: slice, columns: slice) -> None:
         self.space, self.tolerance = space, tolerance
         length = self.length = block_length(space)
         y_axis, x_axis = space.axes
         assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
         self.abreast = _ABREAST * length
-        y_starts = starts_of(space.shape[1], length)
-        self.x_starts = starts_of(space.shape[2], self.abreast)
+        y_starts = starts_of(rows, space.shape[1], length)
+        self.x_starts = starts_of(columns, space.shape[2], self.abreast)
         each = tuple(start + k * length for start in self.x_starts for k in range(_ABREAST))
         self.y_blocks = axis_blocks(y_axis, y_starts, length)
         self.x_blocks = axis_blocks(x_axis, each, length)
@@ -160,8 +163,8 @@ class InterpolatedSearch:
         self.bounds[:, :, : self.n_kinked] = 0.0
         kinked = np.unique([lower[: self.n_kinked], upper[: self.n_kinked]])
         self.kinked = tuple(int(blur) for blur in kinked)
-        rows = whole_rows(y_axis, y_starts, length, self.kinked)
-        self.y_rows = rows._replace(entries=rows.entries.astype(np.float32))
+        every = whole_rows(y_axis, y_starts, length, self.kinked)
+        self.y_rows = every._replace(entries=every.entries.astype(np.float32))
         self.x_rows = whole_rows(x_axis, self.x_starts, self.abreast, self.kinked)
 
     @property

@@ -6,6 +6,7 @@ Nothing is accepted or discarded here. The traces hold the positions of all mode
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,8 +16,11 @@ from numpy.typing import NDArray
 
 from keystab.detection import extrema_table, without_seams
 from keystab.dog_space import ScaleSpace, scale_space
-from keystab.extrema import discrete_extrema
+from keystab.extrema import discrete_extrema, within
 from keystab.refinement import positions, trace
+
+Window = tuple[float, float, float, float]
+"""First and last row, first and last column, in pixels."""
 
 Search = Callable[[ScaleSpace, int], NDArray[np.int64]]
 """Finds the discrete extrema of an octave, given its scale-space and its number."""
@@ -67,7 +71,10 @@ class Detector:
 
 
 def detect_in_view(
-    image: NDArray[np.float64], detector: Detector, search: Search | None = None
+    image: NDArray[np.float64],
+    detector: Detector,
+    search: Search | None = None,
+    window: Window | None = None,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Discrete extrema of all octaves of one view, and their refinement traces.
 
@@ -79,6 +86,8 @@ def detect_in_view(
         How to search it.
     search : callable, optional
         What finds the extrema of an octave; `keystab.extrema.discrete_extrema` by default.
+    window : (float, float, float, float), optional
+        First and last row, first and last column, in pixels, between which extrema are asked for.
 
     Returns
     -------
@@ -96,7 +105,11 @@ def detect_in_view(
     """
     octaves, traces = [], []
     for octave, space in enumerate(detector.octaves(image)):
-        found = search(space, octave) if search else discrete_extrema(space, detector.epsilon)
+        asked = None if window is None else samples_of(window, space)
+        if search:
+            found = within(search(space, octave), asked)
+        else:
+            found = discrete_extrema(space, detector.epsilon, window=asked)
         table = extrema_table(space, found)
         models = trace(space, table, detector.max_offset, detector.move, detector.scale_moves)
         models[["y", "x", "sigma"]] = positions(models, space.sampling)
@@ -114,3 +127,13 @@ def detect_in_view(
         followed.append(models.assign(keypoint=number[keypoint])[mask[keypoint]])
         first += int(mask.sum())
     return pd.concat(kept, ignore_index=True), pd.concat(followed, ignore_index=True)
+
+
+def samples_of(window: Window, space: ScaleSpace) -> tuple[slice, slice]:
+    """Rows and columns of a scale-space that lie in a window given in pixels."""
+    step = space.sampling.step
+    top, bottom, left, right = window
+    return (
+        slice(math.ceil(top / step), math.floor(bottom / step) + 1),
+        slice(math.ceil(left / step), math.floor(right / step) + 1),
+    )

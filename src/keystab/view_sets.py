@@ -320,6 +320,57 @@ def common_field_is_empty(
     return not in_common_field(specs, reference_shape, margin, y[:, None], x[None, :]).any()
 
 
+def windows_of_common_field(
+    specs: Sequence[ViewSpec], reference_shape: tuple[int, int], margin: float
+) -> list[tuple[float, float, float, float]]:
+    """Smallest upright rectangle of each view that holds what all views have in common.
+
+    Parameters
+    ----------
+    specs, reference_shape, margin
+        See `in_common_field`.
+
+    Returns
+    -------
+    list of (float, float, float, float)
+        First and last row, first and last column, in pixels of each view; empty ranges where
+        nothing is common.
+
+    Examples
+    --------
+    >>> specs = [ViewSpec(1.1, 10.0, (20, 20), (0.0, shift)) for shift in (0.0, 2.0)]
+    >>> windows_of_common_field(specs, (200, 200), 3)
+    [(3.0, 16.0, 5.0, 16.0), (3.0, 16.0, 3.0, 14.0)]
+    """
+    last_y, last_x = (size - 1.0 for size in reference_shape)
+    field = np.array([[0.0, 0.0], [0.0, last_x], [last_y, last_x], [last_y, 0.0]])
+    for spec in specs:
+        for axis, size in enumerate(spec.shape):
+            for sign, limit in ((1.0, margin), (-1.0, -(size - 1 - margin))):
+                position = to_view(spec, reference_shape, *field.T)[axis]
+                field = _cut(field, sign * position - limit)
+    if not len(field):
+        return [(0.0, -1.0, 0.0, -1.0)] * len(specs)
+    windows = []
+    for spec in specs:
+        y, x = (np.round(part, 9) for part in to_view(spec, reference_shape, *field.T))
+        windows.append((float(y.min()), float(y.max()), float(x.min()), float(x.max())))
+    return windows
+
+
+def _cut(corners: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cut a convex polygon where a linear function of its corners becomes negative."""
+    kept = []
+    for k in range(len(corners)):
+        after = (k + 1) % len(corners)
+        if height[k] >= 0:
+            kept.append(corners[k])
+        if height[k] * height[after] < 0:
+            share = height[k] / (height[k] - height[after])
+            kept.append(corners[k] + share * (corners[after] - corners[k]))
+    return np.array(kept).reshape(-1, 2)
+
+
 def common_scales(
     specs: Sequence[ViewSpec],
     sigma_min: float,

@@ -21,7 +21,9 @@ def both(image, n_spo, epsilon=0.0, camera_blur=1.1, **options):
     assert applies(space)
     tolerance = max(epsilon, space.rounding)
     with ThreadPoolExecutor(1) as pool:
-        dense = np.concatenate(extrema._evaluated(space, tolerance, pool, None))
+        dense = np.concatenate(
+            extrema._evaluated(space, tolerance, pool, None, extrema.inner_window(space))
+        )
     dense = dense[np.lexsort((dense[:, 2], dense[:, 1], dense[:, 0]))]
     return extrema.discrete_extrema(space, epsilon), dense
 
@@ -85,7 +87,7 @@ def test_a_constant_picture_has_none():
 @pytest.mark.parametrize("n_spo", [12, 15])
 def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
     space = scale_space(scene(kind), 1.1, n_spo)
-    search = InterpolatedSearch(space, 0.0)
+    search = InterpolatedSearch(space, 0.0, *extrema.inner_window(space))
     bounds = error_bounds(space, search.y_blocks, search.x_blocks)
     dog = space.window()
     nodes, expand = expansion(search.length)
@@ -95,7 +97,7 @@ def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
             box = dog[:, top : top + search.length, left : left + search.length]
             interpolated = expand @ box[:, nodes][:, :, nodes] @ expand.T
             off = np.abs(interpolated - box).max(axis=(1, 2))
-            bound = bounds[i, j // 4]
+            bound = bounds[i, j // interpolated_search._ABREAST]
             assert (off <= bound + 1e-14).all()
             reached = max(reached, (off / bound)[:4].max())
     assert reached > 1e-3
@@ -105,7 +107,8 @@ def test_blocks_with_too_many_candidates_are_evaluated(monkeypatch):
     monkeypatch.setattr(interpolated_search, "_KINKED", 0.0)  # slice 1 is then all candidates
     image = blobs((31, 43), 3)
     found, dense = both(image, 15)
-    search = InterpolatedSearch(scale_space(image, 1.1, 15), 1e-14)
+    space = scale_space(image, 1.1, 15)
+    search = InterpolatedSearch(space, 1e-14, *extrema.inner_window(space))
     assert any(search.candidates(column)[1] for column in range(search.n_columns))
     assert found.tolist() == dense.tolist()
 
@@ -116,3 +119,23 @@ def test_coarse_small_and_cosine_scale_spaces_are_not_interpolated():
     assert not applies(scale_space(image, 1.1, 5))
     assert not applies(scale_space(image[:9, :9], 1.1, 15))
     assert not applies(scale_space(image, 1.1, 15, oversampling="cosine"))
+
+
+@pytest.mark.parametrize("n_spo", [5, 15])
+@pytest.mark.parametrize(
+    "part",
+    [(0.2, 0.7, 0.1, 0.6), (-1.0, 2.0, 0.5, 3.0), (0.9, 1.0, 0.0, 1.0), (0.5, 0.5, 0.2, 0.9)],
+)
+def test_a_window_has_the_extrema_that_lie_in_it(n_spo, part):
+    space = scale_space(blobs((34, 47), 3), 1.1, n_spo)
+    rows, columns = (
+        slice(int(first * size), int(last * size))
+        for first, last, size in zip(part[::2], part[1::2], space.shape[1:], strict=True)
+    )
+    everywhere = extrema.discrete_extrema(space)
+    inside = (everywhere[:, 1] >= rows.start) & (everywhere[:, 1] < rows.stop)
+    inside &= (everywhere[:, 2] >= columns.start) & (everywhere[:, 2] < columns.stop)
+    found = extrema.discrete_extrema(space, window=(rows, columns))
+    assert found.tolist() == everywhere[inside].tolist()
+    if part[1] - part[0] > 0.4:
+        assert inside.any() and not inside.all()

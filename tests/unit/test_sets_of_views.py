@@ -26,6 +26,7 @@ from keystab.view_sets import (
     to_common_frame,
     view_shapes,
     view_specs,
+    windows_of_common_field,
 )
 from keystab.view_tables import (
     CommonRange,
@@ -35,7 +36,7 @@ from keystab.view_tables import (
     precision_table,
     scale_table,
 )
-from keystab.views import ViewSpec
+from keystab.views import ViewSpec, to_reference, to_view
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
 PLAIN = {
@@ -293,3 +294,31 @@ def test_stability_against_scale_counts_each_octave_by_itself():
         rows["percentage_seen"].tolist()[:2] == [40.0, 60.0] and rows["percentage_seen"].isna()[2]
     )
     assert rows["mean_above"].tolist() == [7.5, 4.0, 0.0]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10**6))
+def test_windows_hold_the_common_field_and_touch_it(seed):
+    rng = np.random.default_rng(seed)
+    specs = [
+        ViewSpec(1.1, rng.uniform(8, 12), (50, 70), tuple(rng.uniform(-3, 3, 2)), rng.uniform(0, 7))
+        for _ in range(3)
+    ]
+    y, x = (grid.ravel() for grid in np.mgrid[0:50:0.1, 0:70:0.1])
+    inside = in_common_field(specs, (640, 880), 5, y, x)
+    assert inside.any()
+    reference = to_reference(specs[0], (640, 880), y[inside], x[inside])
+    for spec, (top, bottom, left, right) in zip(
+        specs, windows_of_common_field(specs, (640, 880), 5), strict=True
+    ):
+        there_y, there_x = to_view(spec, (640, 880), *reference)
+        assert top - 1e-6 <= there_y.min() <= top + 0.4
+        assert bottom - 0.4 <= there_y.max() <= bottom + 1e-6
+        assert left - 1e-6 <= there_x.min() <= left + 0.4
+        assert right - 0.4 <= there_x.max() <= right + 1e-6
+
+
+def test_views_without_a_common_field_have_empty_windows():
+    specs = [ViewSpec(1.1, 10.0, (20, 20), (0.0, shift)) for shift in (0.0, 15.0)]
+    for top, bottom, left, right in windows_of_common_field(specs, (200, 200), 3):
+        assert bottom < top and right < left

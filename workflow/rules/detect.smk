@@ -65,6 +65,29 @@ use rule detect as detect_stored with:
         n_spo=one_of(KEPT),
 
 
+use rule detect as detect_cosine with:
+    output:
+        extrema=f"{RESULTS}/keypoints/cosine_n{{n_spo}}.parquet",
+        traces=f"{RESULTS}/keypoints/cosine_traces_n{{n_spo}}.parquet",
+    log:
+        f"{LOGS}/detect_cosine/n{{n_spo}}.log",
+    benchmark:
+        f"{LOGS}/benchmarks/detect_cosine/n{{n_spo}}.tsv"
+    wildcard_constraints:
+        n_spo="[0-9]+",
+    params:
+        sigma_min=setting("detector.sigma_min"),
+        kappa=setting("detector.kappa"),
+        oversampling="cosine",
+        epsilon=setting("detector.epsilon"),
+        scale_moves=setting("refinement.scale_moves"),
+        move=setting("refinement.move"),
+        max_offset=max_offset_of_path,
+        store="",
+        code=fingerprint("keystab.stages.detect"),
+        software=SOFTWARE,
+
+
 rule detect_grid:
     """Detect the extrema of one row of figure 3's grid: one n_spo, every delta_min."""
     input:
@@ -119,6 +142,7 @@ rule detect_views:
     params:
         assumed_blur=assumed_blur_of_set,
         n_oct=setting("sets.{set}.n_oct"),
+        guard=setting("sets.{set}.guard"),
         delta_min=setting("sets.{set}.delta_min"),
         sigma_min=sigma_min_of_set,
         kappa=setting("detector.kappa"),
@@ -140,6 +164,7 @@ rule detect_views:
             --n-spo {wildcards.n_spo} \
             --assumed-blur {params.assumed_blur} \
             --n-oct {params.n_oct} \
+            --guard {params.guard} \
             --delta-min {params.delta_min} \
             --sigma-min {params.sigma_min} \
             --kappa {params.kappa} \

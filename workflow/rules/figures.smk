@@ -344,3 +344,47 @@ use rule fig1 as floor with:
         module="keystab.figures.floor",
         code=fingerprint("keystab.figures.floor"),
         software=SOFTWARE,
+
+
+use rule fig1 as truth with:
+    input:
+        f"{RESULTS}/tables/truth_samplings.csv",
+        f"{RESULTS}/tables/truth_cosine.csv",
+        f"{RESULTS}/tables/truth_grid.csv",
+        f"{RESULTS}/tables/truth_kappas.csv",
+        f"{RESULTS}/tables/truth_views.csv",
+        f"{RESULTS}/tables/truth_causes.csv",
+        f"{RESULTS}/tables/truth_auc.csv",
+    output:
+        pdf=f"{DRAWN}/truth.pdf",
+        png=report(f"{DRAWN}/truth.png", caption="../report/truth.rst", category="Figures"),
+    log:
+        f"{LOGS}/truth.log",
+    benchmark:
+        f"{LOGS}/benchmarks/truth.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.truth",
+        code=fingerprint("keystab.figures.truth"),
+        software=SOFTWARE,
+
+
+use rule fig1 as refinement with:
+    input:
+        f"{RESULTS}/tables/refinement_choices.csv",
+    output:
+        pdf=f"{DRAWN}/refinement.pdf",
+        png=report(
+            f"{DRAWN}/refinement.png", caption="../report/refinement.rst", category="Figures"
+        ),
+    log:
+        f"{LOGS}/refinement.log",
+    benchmark:
+        f"{LOGS}/benchmarks/refinement.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.refinement",
+        code=fingerprint("keystab.figures.refinement"),
+        software=SOFTWARE,

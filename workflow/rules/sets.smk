@@ -209,6 +209,42 @@ def tolerance_of_variant(name):
     return -1.0 if applied else variant["epsilon"] / variant["grey_range"]
 
 
+def end_of_truth(_wildcards):
+    """Scale up to which true extrema are sought."""
+    truth = config["truth"]
+    end = config["detector"]["sigma_min"] * truth["last_scale"] * truth["beyond"]
+    return Named("truth.end", end)
+
+
+def sweep_of_set(name):
+    """Sweep that a set is a member of, or its own name."""
+    return next(
+        (sweep for sweep, sets in SWEEPS.items() if name in {one.name for one in sets}), name
+    )
+
+
+def value_of_set(name):
+    """Value of a member of a sweep; nan for a set of its own."""
+    values = {one.name: one.value for sets in SWEEPS.values() for one in sets}
+    return values.get(name, "nan")
+
+
+def judged_sets():
+    """Sets of views of the step of the view 'still', each with the samplings that are judged."""
+    step = config["sets"]["still"]["step"]
+    judged = ["translations", "rotations"]
+    judged += [one.name for sweep in SWEEP_OF.values() for one in SWEEPS[sweep]]
+    return [
+        (name, n_spo)
+        for name in judged
+        if config["sets"][name]["step"] == step
+        for n_spo in config["sets"][name]["n_spo"]
+    ]
+
+
+JUDGED = judged_sets()
+
+
 def files_of_variants(path):
     """Files of the views that the variants search, one per variant."""
     sets = [variant["set"] for variant in config["floor"]["variants"].values()]

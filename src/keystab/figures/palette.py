@@ -66,6 +66,15 @@ TOLERANCE_COLOURS = {
 """Tolerances of the comparison with neighbours (figure floor)."""
 
 
+CAUSE_COLOURS = {
+    "true": "#009E73",
+    "degenerate": "#8fd4bb",
+    "edge": "#d9d9d9",
+    "twin": "#F0B060",
+    "nothing": "#D55E00",
+}
+"""What a keypoint is, from right to wrong (figure truth)."""
+
 COMPARED_COLOURS = {"found": CHANGE_COLOURS["lost"], "right": CHANGE_COLOURS["new"]}
 """Shares of keypoints that are not lost, and that are not new (figure S2)."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from keystab.comparison import comparable
 from keystab.errors import InputError
+from keystab.judgement import judged, with_positions
 from keystab.seals import verify
 from keystab.stores import StoredViews
 from keystab.tables import read_table
@@ -141,6 +142,45 @@ def comparable_only(
             args.last_scale,
         )
     ]
+
+
+def octave_of_view(
+    args: argparse.Namespace, shape: tuple[int, int]
+) -> Callable[[pd.DataFrame, str], NDArray[np.bool_]]:
+    """Say which rows of a table, by the scale in one of its columns, are compared with truth."""
+
+    def inside(table: pd.DataFrame, scale_column: str) -> NDArray[np.bool_]:
+        return comparable(
+            table,
+            shape,
+            args.sigma_min,
+            args.first_scale,
+            args.border,
+            scale_column,
+            args.last_scale,
+        )
+
+    return inside
+
+
+def judged_in_octave(
+    found: pd.DataFrame,
+    truth: pd.DataFrame,
+    shape: tuple[int, int],
+    args: argparse.Namespace,
+    scale_column: str,
+) -> dict[str, Any]:
+    """Hold detections against true extrema in the range that is compared."""
+    inside = octave_of_view(args, shape)
+    finite = with_positions(found)
+    return judged(
+        finite, truth, inside(finite, scale_column), inside(truth, "sigma"), **tolerances(args)
+    )
+
+
+def tolerances(args: argparse.Namespace) -> dict[str, float]:
+    """Collect how far apart a detection and a true extremum may be."""
+    return {name: getattr(args, name) for name in ("space_tolerance", "scale_ratio")}
 
 
 def same_options(args: argparse.Namespace) -> dict[str, Any]:

@@ -110,6 +110,14 @@ def range_arguments(to: argparse.ArgumentParser) -> None:
     required(to, "last-scale", last, type=optional(float))
 
 
+def judged_arguments(to: argparse.ArgumentParser) -> None:
+    """Add what decides which detections are held against true extrema, and when they agree."""
+    required(to, "border", "pixels left out at the border of the view", type=float)
+    required(to, "first-scale", "lower end of the scale range, over sigma-min", type=float)
+    required(to, "last-scale", "upper end of the scale range, over sigma-min", type=float)
+    tolerance_arguments(to)
+
+
 def view_range_arguments(to: argparse.ArgumentParser) -> None:
     """Add what decides which detections of the views of a set are compared."""
     required(to, "sigma-min", "first scale in pixels", type=float)

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keystab.dog_space import ScaleSpace
-from keystab.stages._inputs import View
+from keystab.stages._inputs import View, Views
 from keystab.stored_extrema import stored_extrema
 from keystab.stores import StoredScaleSpace
-from keystab.view_detection import Detector, Search
+from keystab.view_detection import Detector, Search, Window
+from keystab.view_sets import windows_of_common_field
+
+# Pixels around what all views have in common in which extrema are sought too.
+_RIM = 4.0
 
 
 def view_detector(args: argparse.Namespace, view: View) -> Detector:
@@ -25,6 +30,27 @@ def view_detector(args: argparse.Namespace, view: View) -> Detector:
         # Paths of nearest moves serve every M_offset; below 1/2 they do not move on anyway.
         options["max_offset"] = 0.5 if args.max_offset is None else args.max_offset
     return Detector(camera_blur=blur, **options)
+
+
+def searched_windows(views: Views, guard: float) -> list[Window | None]:
+    """Part of each view in which extrema are sought: what all views have in common, and a rim.
+
+    No keypoint beyond it is ever compared. The rim is for what the refinement moves and for
+    neighbours that are the same; windows end at every fourth pixel, so that views that differ by a
+    fraction of a pixel are searched alike.
+    """
+    if guard == 0:
+        return [None] * len(views)
+    windows = windows_of_common_field(views.specs, views.reference_shape, guard)
+    return [
+        (
+            4.0 * math.floor((top - _RIM) / 4),
+            4.0 * math.ceil((bottom + _RIM) / 4),
+            4.0 * math.floor((left - _RIM) / 4),
+            4.0 * math.ceil((right + _RIM) / 4),
+        )
+        for top, bottom, left, right in windows
+    ]
 
 
 def store_of(folder: Path, number: int, octave: int) -> Path:

@@ -14,6 +14,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = _run.parser(__doc__)
     _run.views_arguments(parser)
     _run.view_detector_arguments(parser)
+    _run.required(parser, "guard", "guard band of the views, pixels", type=float)
     _run.required(parser, "epsilon", "least difference to the 26 neighbours", type=float)
     _run.required(parser, "scale-moves", "whether a step may change the scale", type=_run.boolean)
     _run.required(parser, "move", "nearest or unit_step")
@@ -29,19 +30,21 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.progress import progress
     from keystab.seals import verify
     from keystab.stages._inputs import read_views
-    from keystab.stages._scale_spaces import search_of_stores, view_detector
+    from keystab.stages._scale_spaces import search_of_stores, searched_windows, view_detector
     from keystab.tables import write_table
     from keystab.view_detection import detect_in_view
 
     views = read_views(args.views, args.views_digest)
     if args.store is not None:
         verify(args.store, args.store_digest)
+    windows = searched_windows(views, args.guard)
     extrema, traces, first = [], [], 0
     for number, view in enumerate(progress(views, len(views), f"views, n_spo {args.n_spo}")):
         found, models = detect_in_view(
             view.image,
             view_detector(args, view),
             None if args.store is None else search_of_stores(args.store, number, args.epsilon),
+            windows[number],
         )
         found.insert(0, "view", number)
         models["keypoint"] += first

@@ -14,6 +14,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = _run.parser(__doc__)
     _run.views_arguments(parser)
     _run.scale_arguments(parser)
+    _run.required(parser, "sigma-max", "last scale in pixels", type=float)
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
 
@@ -22,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.truth import true_extrema
 
     view = read_view(args.views, args.views_digest)
-    extrema = true_extrema(view.image, view.blur, args.sigma_min, 2.0 * args.sigma_min, args.kappa)
+    extrema = true_extrema(view.image, view.blur, args.sigma_min, args.sigma_max, args.kappa)
     write_table(extrema, args.table)
     print(f"{len(extrema)} true extrema")
 
