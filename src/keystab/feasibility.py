@@ -107,9 +107,7 @@ def setting_problems(settings: Settings) -> list[str]:
         problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")
     problems += _order(settings["semigroup"], "semigroup", "sigma_from", "sigma_to")
     problems += _order(settings["blobs"], "blobs", "size_from", "size_to")
-    problems += _chosen(settings, "truth", "fractions", "kappas", "fractions")
     available = settings["samplings"]["n_spo"]
-    problems += _chosen(settings, "truth", "refined_n_spo", "samplings", "n_spo")
     if settings["truth"]["last_scale"] <= settings["comparison"]["first_scale"]:
         problems.append(
             f"truth.last_scale is {settings['truth']['last_scale']}, allowed is a number above "
@@ -125,17 +123,6 @@ def setting_problems(settings: Settings) -> list[str]:
     if len(set(folders)) < len(folders):
         problems.append("results, figures and logs name the same folder; give three")
     return problems
-
-
-def _chosen(settings: Settings, block: str, key: str, other: str, of: str) -> list[str]:
-    available = settings[other][of]
-    unknown = [value for value in settings[block][key] if value not in available]
-    if not unknown:
-        return []
-    return [
-        f"{block}.{key} has {', '.join(f'{value:g}' for value in unknown)}, allowed are members of "
-        f"{other}.{of} = {available}"
-    ]
 
 
 def _order(block: Settings, name: str, lower: str, upper: str) -> list[str]:

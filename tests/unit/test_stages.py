@@ -111,6 +111,8 @@ def test_stored_and_streamed_detections_of_a_set_are_the_same_to_the_bit(referen
     stores, seal = str(tmp_path / "stores"), str(tmp_path / "stores.sha256")
     assert scale_spaces.main(views_arguments(tmp_path, "--store", stores, "--digest", seal)) == 0
     search = [
+        "--guard",
+        "2",
         "--epsilon",
         "0.0",
         "--scale-moves",
@@ -236,7 +238,8 @@ def test_the_truth_is_that_of_the_stored_view(reference, tmp_path):
     assert simulate.main(view_arguments(reference, tmp_path, step="5", blur="0.9")) == 0
     given = [str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]
     out = tmp_path / "truth.parquet"
-    arguments = ["--views", *given, "--sigma-min", "1.2", "--kappa", "1.3", "--table", str(out)]
+    arguments = ["--views", *given, "--sigma-min", "1.2", "--kappa", "1.3"]
+    arguments += ["--sigma-max", "2.4", "--table", str(out)]
     assert find_truth.main(arguments) == 0
     view = read_view(tmp_path / "views", tmp_path / "views.sha256")
     found = read_table(out)

@@ -40,7 +40,7 @@ def sets(tmp_path_factory) -> list[Path]:
             *("--views", str(member / "views"), "--views-digest", str(member / "views.sha256")),
             *("--n-spo", "4", "--assumed-blur", "None", "--n-oct", "2", "--delta-min", "None"),
             *("--sigma-min", "1.1", "--kappa", KAPPA, "--oversampling", "spline"),
-            *("--epsilon", "0.0", "--scale-moves", "True", "--move", "nearest"),
+            *("--guard", "0", "--epsilon", "0.0", "--scale-moves", "True", "--move", "nearest"),
             *("--max-offset", "None", "--extrema", str(member / "extrema.parquet")),
             *("--traces", str(member / "traces.parquet")),
         ]

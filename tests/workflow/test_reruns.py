@@ -8,8 +8,13 @@ import time
 import pytest
 from project import QUICK
 
-FIGURES = {f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")} | {"floor"}
+FIGURES = {f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")} | {
+    "floor",
+    "truth",
+    "refinement",
+}
 AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
+AFTER_MATCHING |= {"judge_keypoints", "truth"}
 SAMPLINGS = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
 VIEWS = {"match_views", "match_shipped", "fig7", "fig8", "figS1"}
 SWEEPS = {"match_sweep", "match_blurs", "fig10", "fig11", "fig12", "figS2"}
@@ -17,11 +22,16 @@ KAPPAS = {"match_kappas", "fig9"}
 BLOBS = {"detect_blobs", "figS4"}
 VARIANTS = {"match_variants", "floor"}
 MATCHING = SAMPLINGS | VIEWS | SWEEPS | KAPPAS | VARIANTS
+ACCEPTING = {"judge_samplings", "judge_cosine", "judge_kappas", "judge_views", "truth"}
+JUDGING = ACCEPTING | {"judge_grid", "judge_keypoints", "judge_refinement", "refinement"}
+TRUTHS = {"find_truth", "find_truth_of_kappa", "find_scene"}
 ONE_VIEW = {"detect", "detect_stored", "detect_grid", "count_refined"} | SAMPLINGS
-DETECTION = ONE_VIEW | {"detect_views", "detect_kappas", "detect_variant"} | MATCHING
+DETECTION = ONE_VIEW | {"detect_views", "detect_kappas", "detect_variant"} | MATCHING | JUDGING
+DETECTION |= {"detect_cosine"}
 STILL = (
     {"simulate", "scale_space", "detect_kappas", "detect_variant"} | ONE_VIEW | KAPPAS | VARIANTS
 )
+STILL |= TRUTHS | JUDGING | {"detect_cosine"}
 SIMULATION = STILL | DETECTION | {"describe_views", "crop_views", "fig2"}
 THEORY = {"semigroup", "noise_theory", "camera_optics"} | BLOBS
 EVERYTHING = SIMULATION | FIGURES | THEORY
@@ -44,7 +54,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
     [
         ("src/keystab/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
         ("src/keystab/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
-        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS),
+        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
         ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", SIMULATION),
@@ -65,13 +75,13 @@ def test_edits_of_code(finished, name, old, new, expected):
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS | BLOBS),
-        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "detect_variant"} - VARIANTS),
+        ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS | BLOBS | ACCEPTING),
+        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "judge_grid", "detect_variant"} - VARIANTS),
         ("comparison: {match_sign: true}", MATCHING),
         ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS | SWEEPS | VARIANTS),
-        ("comparison: {scale_ratio: 1.5}", MATCHING),
+        ("comparison: {scale_ratio: 1.5}", MATCHING | JUDGING),
         ("stability: {seen_by: 0.6}", {"match_sweep", "fig10", "fig11", "fig12"}),
-        ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12"}),
+        ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "judge_views", "truth"}),
         ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
@@ -79,10 +89,12 @@ def test_edits_of_code(finished, name, old, new, expected):
         ("blobs: {camera_blur: 0.7}", BLOBS),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
         ("stability: {n_resamples: 200}", VIEWS | {"match_sweep", "fig10", "fig11", "fig12"}),
-        ("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7"}),
+        ("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7", "judge_refinement", "refinement"}),
         ("shipped: {contrast: 0.02}", {"match_shipped", "fig7"}),
-        ("kappas: {fractions: [2, 5]}", {"detect_kappas"} | KAPPAS),
+        ("kappas: {fractions: [2, 3, 10]}", {"detect_kappas", "judge_kappas", "truth"} | KAPPAS),
         ("sets: {zooms: {zoom: 1.4}}", {"simulate", "detect_views", "match_views", "fig8"}),
+        ("truth: {last_scale: 1.9}", JUDGING | TRUTHS),
+        ("truth: {most_iterations: 4}", {"judge_refinement", "refinement"}),
         ("draft: false", FIGURES),
         # 1.1 is also the blur and 0.0 also the shift: the set of values stays the same.
         ("sets: {still: {noise: 1.1, step: 20}}", STILL),

@@ -244,6 +244,16 @@ def judged_sets():
 
 JUDGED = judged_sets()
 
+# What figures truth and refinement single out of the ratios and samplings that are searched.
+TRUE_FRACTIONS = [
+    fraction
+    for fraction in config["truth"]["fractions"]
+    if fraction in config["kappas"]["fractions"]
+] or config["kappas"]["fractions"][:1]
+REFINED_N_SPO = [
+    n_spo for n_spo in config["truth"]["refined_n_spo"] if n_spo in config["samplings"]["n_spo"]
+] or sorted({config["samplings"]["n_spo"][0], config["samplings"]["n_spo"][-1]})
+
 
 def files_of_variants(path):
     """Files of the views that the variants search, one per variant."""

@@ -12,6 +12,16 @@ def truth_of_kappa(fraction):
     return f"{RESULTS}/truth/view_{fraction:g}.parquet"
 
 
+def kappas_with_truth(_wildcards):
+    """Ratios of the two blurs that have a truth of their own."""
+    return Named("truth.kappas", [2 ** (1 / one) for one in TRUE_FRACTIONS])
+
+
+def guards_of_judged_sets(_wildcards):
+    """Guard band of every set that is held against the scene."""
+    return Named("guards", [config["sets"][name]["guard"] for name, _ in JUDGED])
+
+
 def kappa_of_file(wildcards):
     """Ratio of the two blurs that a file of true extrema belongs to."""
     return Named("kappa", 2 ** (1 / float(wildcards.fraction)))
@@ -244,7 +254,7 @@ rule judge_kappas:
     input:
         views=ancient(f"{RESULTS}/views/still"),
         digest=f"{RESULTS}/views/still.sha256",
-        truths=[truth_of_kappa(fraction) for fraction in config["truth"]["fractions"]],
+        truths=[truth_of_kappa(fraction) for fraction in TRUE_FRACTIONS],
         extrema=f"{RESULTS}/keypoints/kappas_extrema.parquet",
         traces=f"{RESULTS}/keypoints/kappas_traces.parquet",
     output:
@@ -254,7 +264,7 @@ rule judge_kappas:
     benchmark:
         f"{LOGS}/benchmarks/judge_kappas.tsv"
     params:
-        kappas=Named("kappas", [2 ** (1 / fraction) for fraction in config["truth"]["fractions"]]),
+        kappas=kappas_with_truth,
         sigma_min=setting("detector.sigma_min"),
         border=setting("comparison.border"),
         first_scale=setting("comparison.first_scale"),
@@ -266,7 +276,7 @@ rule judge_kappas:
         code=fingerprint("keystab.stages.judge_kappas"),
         software=SOFTWARE,
     message:
-        "Holding the keypoints of {config[truth][fractions]} against the true extrema"
+        "Holding the keypoints for kappa = {params.kappas} against the true extrema"
     shell:
         """
         python -m keystab.stages.judge_kappas \
@@ -309,7 +319,7 @@ rule judge_views:
         sweeps=Named("sweeps", [sweep_of_set(name) for name, _ in JUDGED]),
         values=Named("values", [value_of_set(name) for name, _ in JUDGED]),
         n_spo=Named("n_spo", [n for _, n in JUDGED]),
-        guards=Named("guards", [config["sets"][name]["guard"] for name, _ in JUDGED]),
+        guards=guards_of_judged_sets,
         sigma_min=setting("detector.sigma_min"),
         border=setting("comparison.border"),
         first_scale=setting("comparison.first_scale"),
@@ -405,7 +415,7 @@ rule judge_refinement:
         truth=f"{RESULTS}/truth/view.parquet",
         samplings=expand(
             f"{RESULTS}/keypoints/sampling_n{{n_spo}}.parquet",
-            n_spo=config["truth"]["refined_n_spo"],
+            n_spo=REFINED_N_SPO,
         ),
     output:
         table=f"{RESULTS}/tables/refinement_choices.csv",
@@ -414,7 +424,7 @@ rule judge_refinement:
     benchmark:
         f"{LOGS}/benchmarks/judge_refinement.tsv"
     params:
-        n_spo=setting("truth.refined_n_spo"),
+        n_spo=Named("truth.refined_n_spo", REFINED_N_SPO),
         sigma_min=setting("detector.sigma_min"),
         kappa=setting("detector.kappa"),
         oversampling=setting("detector.oversampling"),

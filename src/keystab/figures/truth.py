@@ -179,7 +179,7 @@ def _draw_grid(ax: Axes, grid: DataFrame) -> None:
         if np.isfinite(share):
             colour = palette.readable_on(colours((share - lowest) / (1 - lowest)))
             ax.text(column, row, f"{100 * share:.0f}", color=colour, ha="center", va="center",
-                    fontsize=5.6)  # fmt: skip
+                    fontsize=style.SMALL)  # fmt: skip
     ax.set_xticks(range(len(table.columns)), [f"{n}" for n in table.columns])
     ax.set_yticks(range(len(table.index)), [f"{d:g}" for d in table.index])
     ax.set_xlabel(style.N_SPO)
@@ -257,7 +257,7 @@ def _draw_areas(ax: Axes, table: DataFrame) -> None:
     ax.axvline(0.5, color=palette.GREY, linewidth=0.7, linestyle=":")
     ax.set_yticks(place, [style.FEATURE_NAMES[name] for name in features])
     ax.set(xlim=(0.4, 1.0), ylim=(len(features) - 0.5, -0.6))
-    ax.set_xlabel("area under the ROC curve (open: stability, full: truth)")
+    ax.set_xlabel("ROC area (open: stability, full: truth)")
     style.finish_axes(ax)
 
 
