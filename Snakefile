@@ -1,7 +1,8 @@
 """keystab: can a keypoint be trusted? The study's table of contents.
 
 Comes in: a picture and the settings of config/config.yaml.
-Goes out: figures/figN.pdf and .png, with the numbers that they draw in results/tables/figN*.csv.
+Goes out: figures/figN.pdf and .png, with the numbers that they draw in results/tables/figN*.csv,
+and results/claims.md, a verdict for every claim of the paper.
 
     snakemake -j2                                      the whole study
     snakemake figures/fig5.pdf -j2                     one figure
@@ -23,6 +24,7 @@ include: "workflow/rules/match.smk"  # extrema of many samplings -> tables
 include: "workflow/rules/compare.smk"  # extrema of many views -> tables
 include: "workflow/rules/floor.smk"  # views -> extrema in variants of the arithmetic -> tables
 include: "workflow/rules/theory.smk"  # settings -> tables of what needs no picture
+include: "workflow/rules/claims.smk"  # tables -> verdicts on what the paper says
 include: "workflow/rules/figures.smk"  # tables -> figures
 
 
@@ -54,9 +56,10 @@ FIGURES += ["floor", "truth", "refinement"]
 
 
 rule all:
-    """Every figure, and the tables that no figure draws."""
+    """Every figure, the tables that no figure draws, and the verdicts."""
     default_target: True
     input:
         expand(f"{DRAWN}/{{figure}}.{{kind}}", figure=FIGURES, kind=["pdf", "png"]),
         f"{RESULTS}/tables/refinement.csv",
+        f"{RESULTS}/claims.md",
         expand(f"{RESULTS}/scale_space/n{{n_spo}}.sha256", n_spo=KEPT),

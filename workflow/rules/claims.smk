@@ -1,0 +1,44 @@
+"""The ledger of claims: what the paper says, and what the tables answer.
+
+Comes in: config/claims.yaml and the tables that its claims name. Goes out: {results}/claims.csv,
+.json and .md. Steps: take the numbers of every claim from the tables; ask its criterion; write the
+verdicts.
+"""
+
+from keystab.claims import read_claims, table_names
+
+try:
+    CLAIMED_TABLES = table_names(read_claims(Path(workflow.basedir, "config/claims.yaml")))
+except InputError as problem:
+    sys.exit(str(problem))
+
+
+rule claims:
+    """A verdict for every claim of the paper."""
+    input:
+        tables=expand(f"{RESULTS}/tables/{{table}}.csv", table=CLAIMED_TABLES),
+        claims="config/claims.yaml",
+    output:
+        csv=f"{RESULTS}/claims.csv",
+        json=f"{RESULTS}/claims.json",
+        markdown=f"{RESULTS}/claims.md",
+    log:
+        f"{LOGS}/claims.log",
+    benchmark:
+        f"{LOGS}/benchmarks/claims.tsv"
+    params:
+        tables=folder_of_inputs,
+        code=fingerprint("keystab.stages.judge_claims"),
+        software=SOFTWARE,
+    message:
+        "Judging the claims of the paper"
+    shell:
+        """
+        python -m keystab.stages.judge_claims \
+            --claims {input.claims:q} \
+            --tables {params.tables:q} \
+            --csv {output.csv:q} \
+            --json {output.json:q} \
+            --markdown {output.markdown:q} \
+            >{log:q} 2>&1
+        """
