@@ -311,7 +311,9 @@ def read_claims(path: str | os.PathLike[str]) -> list[Claim]:
         In one line that names the claim, if anything in it cannot work.
     """
     try:
-        entries = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        # The compiled loader is ten times as fast, and every start of Snakemake reads the file.
+        loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+        entries = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=loader)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except yaml.YAMLError as error:
