@@ -259,3 +259,23 @@ def files_of_variants(path):
     """Files of the views that the variants search, one per variant."""
     sets = [variant["set"] for variant in config["floor"]["variants"].values()]
     return [path.format(set=name) for name in sets]
+
+
+def truth_of_kappa(fraction):
+    """File of the true extrema of the view for kappa = 2^(1/fraction)."""
+    return f"{RESULTS}/truth/view_{fraction:g}.parquet"
+
+
+def kappas_with_truth(_wildcards):
+    """Ratios of the two blurs that have a truth of their own."""
+    return Named("truth.kappas", [2 ** (1 / one) for one in TRUE_FRACTIONS])
+
+
+def guards_of_judged_sets(_wildcards):
+    """Guard band of every set that is held against the scene."""
+    return Named("guards", [config["sets"][name]["guard"] for name, _ in JUDGED])
+
+
+def kappa_of_file(wildcards):
+    """Ratio of the two blurs that a file of true extrema belongs to."""
+    return Named("kappa", 2 ** (1 / float(wildcards.fraction)))

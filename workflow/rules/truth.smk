@@ -7,26 +7,6 @@ scale-space, by Newton's method on the full sums; hold the detections against th
 """
 
 
-def truth_of_kappa(fraction):
-    """File of the true extrema of the view for kappa = 2^(1/fraction)."""
-    return f"{RESULTS}/truth/view_{fraction:g}.parquet"
-
-
-def kappas_with_truth(_wildcards):
-    """Ratios of the two blurs that have a truth of their own."""
-    return Named("truth.kappas", [2 ** (1 / one) for one in TRUE_FRACTIONS])
-
-
-def guards_of_judged_sets(_wildcards):
-    """Guard band of every set that is held against the scene."""
-    return Named("guards", [config["sets"][name]["guard"] for name, _ in JUDGED])
-
-
-def kappa_of_file(wildcards):
-    """Ratio of the two blurs that a file of true extrema belongs to."""
-    return Named("kappa", 2 ** (1 / float(wildcards.fraction)))
-
-
 rule find_truth:
     """Find the true extrema of the view that all samplings sample."""
     input:
