@@ -16,9 +16,9 @@ from keystab.refinement import (
     HESSIAN_COLUMNS,
     MOST_MODELS,
     MOVES,
-    accepted,
     positions,
     quadratic_model,
+    refined_table,
     stationary_point,
     trace,
 )
@@ -140,7 +140,7 @@ def detect_keypoints(
                 scale_moves=scale_moves,
                 max_models=int(min(max_iterations, MOST_MODELS)),
             )
-            table = refined_table(space, table, models, max_offset, max_iterations)
+            table = refined_table(space.sampling, table, models, max_offset, max_iterations)
             scale = table["sigma"]
         table["s"] += slices[0]
         octaves.append(table.assign(octave=octave, scale=scale, step=space.sampling.step))
@@ -199,42 +199,6 @@ def extrema_table(space: ScaleSpace, extrema: np.ndarray) -> pd.DataFrame:
         table[name] = hessian[:, i, j]
     table[["step_y", "step_x", "step_sigma"]] = step[["y", "x", "sigma"]]
     table["step_value"] = value + 0.5 * np.einsum("ni,ni->n", gradient, alpha)
-    return table
-
-
-def refined_table(
-    space: ScaleSpace,
-    extrema: pd.DataFrame,
-    models: pd.DataFrame,
-    max_offset: float,
-    max_iterations: float,
-) -> pd.DataFrame:
-    """Keypoints that a refinement accepts.
-
-    Parameters
-    ----------
-    space : ScaleSpace
-        Where the extrema were found.
-    extrema : DataFrame
-        From `extrema_table`.
-    models : DataFrame
-        Their trace, from `keystab.refinement.trace`.
-    max_offset, max_iterations : float
-        M_offset and N_interp.
-
-    Returns
-    -------
-    DataFrame
-        Refined ``y, x, sigma, value`` with ``sign``, the indices ``s, row, column`` and
-        ``difference`` of the discrete extremum, and the number of ``models``.
-    """
-    good = accepted(models, max_offset, max_iterations)
-    table = positions(good, space.sampling)
-    table["value"] = good["value"]
-    origin = extrema.iloc[good["keypoint"].to_numpy()].reset_index(drop=True)
-    for name in ("sign", "s", "row", "column", "difference"):
-        table[name] = origin[name]
-    table["models"] = good["model"]
     return table
 
 

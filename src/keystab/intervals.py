@@ -12,11 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from statistics import NormalDist
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keystab.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Purpose = tuple[int | str, ...]
 
@@ -77,6 +81,27 @@ def wilson_interval(
     low = np.where((k == 0) & (n > 0), 0.0, centre - half)
     high = np.where((k == n) & (n > 0), 1.0, centre + half)
     return low, high
+
+
+def normal_half_width(values: NDArray[Any] | pd.Series) -> float:
+    """Half the width of the 95 % interval of a mean: 1.96 standard errors.
+
+    Parameters
+    ----------
+    values : ndarray or Series, shape (n,)
+        One number per view. Of a Series, NaN does not count in the spread.
+
+    Returns
+    -------
+    float
+        NaN for a single value.
+
+    Examples
+    --------
+    >>> round(normal_half_width(np.array([1.0, 3.0])), 2)
+    1.96
+    """
+    return float(1.96 * values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else np.nan
 
 
 def bootstrap_counts(n: int, n_resamples: int, *purpose: int | str) -> NDArray[np.int64]:

@@ -5,7 +5,6 @@ Stability asks whether detections agree with each other; here they are held agai
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.duplicates import SCALE_RATIO, SPACE_TOLERANCE, pairs_between
-from keystab.intervals import wilson_interval
-from keystab.refinement import accepted, positions
+from keystab.intervals import normal_half_width, wilson_interval
+from keystab.refinement import refined_table
 
 if TYPE_CHECKING:
     from keystab.sampling import Sampling
@@ -65,6 +64,13 @@ def partners(
     >>> partners(found, truth).tolist()
     [-1, 0, -1]
     """
+    return _paired(detections, truth, space_tolerance, scale_ratio)[0]
+
+
+def _paired(
+    detections: pd.DataFrame, truth: pd.DataFrame, space_tolerance: float, scale_ratio: float
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """`partners`, and whether each detection is near any true extremum, taken or not."""
     a, b, distance = pairs_between(detections, truth, space_tolerance, scale_ratio, True)
     partner = np.full(len(detections), -1, dtype=np.intp)
     taken = np.zeros(len(truth), dtype=bool)
@@ -72,7 +78,9 @@ def partners(
         if partner[a[k]] < 0 and not taken[b[k]]:
             partner[a[k]] = b[k]
             taken[b[k]] = True
-    return partner
+    near = np.zeros(len(detections), dtype=bool)
+    near[a] = True
+    return partner, near
 
 
 def judged(
@@ -106,9 +114,7 @@ def judged(
         ``median_location, p90_location`` in pixels and ``median_scale, p90_scale``, of
         ``|log2(sigma / sigma_true)|`` in octaves. NaN where there are none.
     """
-    partner = partners(detections, truth, space_tolerance, scale_ratio)
-    near = np.zeros(len(detections), dtype=bool)
-    near[pairs_between(detections, truth, space_tolerance, scale_ratio, True)[0]] = True
+    partner, near = _paired(detections, truth, space_tolerance, scale_ratio)
     paired = np.flatnonzero(partner >= 0)
     found = np.zeros(len(truth), dtype=bool)
     found[partner[paired]] = True
@@ -190,7 +196,7 @@ def mean_over_views(
     result: dict[str, Any] = {"n_views": n_views}
     result |= {str(name): float(value) for name, value in each.mean().items()}
     for name in ("recall", "precision"):
-        error = 1.96 * each[name].std() / math.sqrt(n_views) if n_views > 1 else math.nan
+        error = normal_half_width(each[name])
         result |= {f"{name}_low": result[name] - error, f"{name}_high": result[name] + error}
     return result
 
@@ -226,10 +232,8 @@ def causes(
     >>> causes(found, truth, 1.386, 2.2).tolist()
     ['true', 'twin', 'edge', 'nothing']
     """
-    partner = partners(detections, truth, space_tolerance, scale_ratio)
-    near, _, _ = pairs_between(detections, truth, space_tolerance, scale_ratio, True)
-    cause = np.full(len(detections), "nothing", dtype="<U10")
-    cause[np.unique(near)] = "twin"
+    partner, near = _paired(detections, truth, space_tolerance, scale_ratio)
+    cause = np.where(near, "twin", "nothing").astype("<U10")
     paired = partner >= 0
     own = truth.iloc[partner[paired]]
     weak = own["conditioning"].to_numpy() < DEGENERATE
@@ -284,13 +288,9 @@ def kept_and_lost(
     options = dict(tolerances or {})
     counted = inside(extrema, "step_sigma")
     right = partners(extrema, truth, **options) >= 0
-    accepted_models = accepted(models, max_offset, max_iterations)
-    keypoint = accepted_models["keypoint"].to_numpy()
+    refined = refined_table(sampling, extrema, models, max_offset, max_iterations)
     kept = np.zeros(len(extrema), dtype=bool)
-    kept[keypoint] = True
-    refined = positions(accepted_models, sampling)
-    refined["sign"] = extrema["sign"].to_numpy()[keypoint]
-    refined["keypoint"] = keypoint
+    kept[refined["keypoint"]] = True
     refined = with_positions(refined)
     judgement = judged(refined, truth, inside(refined, "sigma"), inside(truth, "sigma"), **options)
     wrong = refined["keypoint"].to_numpy()[partners(refined, truth, **options) < 0]

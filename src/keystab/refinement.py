@@ -249,6 +249,44 @@ def _check(move: str, max_offset: float, max_models: int) -> None:
     checks.integer("max_models", max_models, least=1)
 
 
+def refined_table(
+    sampling: Sampling,
+    extrema: pd.DataFrame,
+    models: pd.DataFrame,
+    max_offset: float,
+    max_iterations: float,
+) -> pd.DataFrame:
+    """Keypoints that a refinement accepts.
+
+    Parameters
+    ----------
+    sampling : Sampling
+        Where the extrema were found.
+    extrema : DataFrame
+        From `keystab.detection.extrema_table`.
+    models : DataFrame
+        Their trace, from `trace`.
+    max_offset, max_iterations : float
+        M_offset and N_interp.
+
+    Returns
+    -------
+    DataFrame
+        Refined ``y, x, sigma, value`` with ``sign``, the indices ``s, row, column`` and
+        ``difference`` of the discrete extremum, the number of ``models``, and ``keypoint``, the
+        row in `extrema`.
+    """
+    good = accepted(models, max_offset, max_iterations)
+    table = positions(good, sampling)
+    table["value"] = good["value"]
+    origin = extrema.iloc[good["keypoint"].to_numpy()].reset_index(drop=True)
+    for name in ("sign", "s", "row", "column", "difference"):
+        table[name] = origin[name]
+    table["models"] = good["model"]
+    table["keypoint"] = good["keypoint"]
+    return table
+
+
 def refined_keypoints(
     extrema: pd.DataFrame, traces: pd.DataFrame, max_offset: float, max_iterations: float
 ) -> pd.DataFrame:

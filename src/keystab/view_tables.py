@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.intervals import Purpose, wilson_interval
+from keystab.intervals import Purpose, normal_half_width, wilson_interval
 from keystab.matching import matches, unique_keypoints
 from keystab.precision import mean_precision
 from keystab.stability import stability_curve
@@ -174,7 +174,7 @@ def count_table(matched: MatchedViews, labels: Labels) -> pd.DataFrame:
     """
     n_unique, n_views = matched.found.shape
     per_view = np.bincount(matched.common["view"].to_numpy(np.int64), minlength=n_views)
-    error = 1.96 * per_view.std(ddof=1) / np.sqrt(n_views) if n_views > 1 else np.nan
+    error = normal_half_width(per_view)
     always = int(matched.seen.all(axis=1).sum())
     low, high = wilson_interval(always, n_unique)
     row = {
@@ -242,7 +242,7 @@ def scale_table(
         ).iloc[0]
         above = CommonRange(*field, start).common(detections)
         per_view = np.bincount(above["view"].to_numpy(np.int64), minlength=n_views)
-        error = 1.96 * per_view.std(ddof=1) / np.sqrt(n_views) if n_views > 1 else np.nan
+        error = normal_half_width(per_view)
         rows.append(
             {
                 "sigma_from": start,

@@ -26,6 +26,7 @@ from keystab.figures import (
     figs3,
     figs4,
     palette,
+    style,
 )
 from keystab.figures.style import spread
 
@@ -297,7 +298,7 @@ def test_figure_7_draws_a_curve_for_every_choice():
             expected = {"discrete": here[here["detections"] == "discrete"]}
             for max_offset in figure_tables.OFFSETS:
                 mine = (here["max_offset"] == max_offset) & (here["max_iterations"] == n_models)
-                expected[fig7.limit(max_offset)] = here[mine]
+                expected[style.limit(max_offset)] = here[mine]
             columns = ["percentage_of_images", "percentage_of_unique"]
             for label, rows in expected.items():
                 assert len(rows) == figure_tables.VIEWS
@@ -316,7 +317,7 @@ def test_figure_7_counts_what_is_seen_in_all_views():
     assert len(refined) == 24
     places = set()
     for row in refined.to_dict("records"):
-        limits = [fig7.limit(row[name]) for name in ("max_offset", "max_iterations")]
+        limits = [style.limit(row[name]) for name in ("max_offset", "max_iterations")]
         (x,), (number,) = line(ax, " ".join([str(row["n_spo"]), *limits]))
         places.add(x)
         assert number == row["n_always"]

@@ -7,6 +7,7 @@ the code and the software.
 """
 
 import hashlib
+import math
 import os
 import shlex
 import sys

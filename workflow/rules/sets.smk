@@ -191,7 +191,7 @@ def run_of_variant(name):
 
 
 def of_single_precision(key):
-    """Parameter with a setting of a variant that only single precision uses; elsewhere that of no tolerance."""
+    """Parameter with a setting that only single precision uses; elsewhere one without effect."""
 
     def value_of(wildcards):
         variant = config["floor"]["variants"][wildcards.variant]
@@ -263,6 +263,8 @@ def files_of_variants(path):
 
 def truth_of_kappa(fraction):
     """File of the true extrema of the view for kappa = 2^(1/fraction)."""
+    if math.isclose(2 ** (1 / fraction), config["detector"]["kappa"]):
+        return f"{RESULTS}/truth/view.parquet"
     return f"{RESULTS}/truth/view_{fraction:g}.parquet"
 
 

@@ -99,7 +99,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
             here = curves[curves["n_spo"] == n_spo]
             for ax, n_models in zip(grid[:, column], models, strict=True):
                 labels[ax] = _draw_choices(ax, here, n_models)
-                ax.set_label(name if ax is grid[0, column] else f"{name} {limit(n_models)}")
+                ax.set_label(name if ax is grid[0, column] else f"{name} {style.limit(n_models)}")
         grid[len(models) // 2, 0].set_ylabel("unique keypoints (%)")
         for ax in grid[-1]:
             ax.set_xlabel("seen in at least this share of the views (%)")
@@ -116,23 +116,12 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         return style.settle(figure, draft)
 
 
-def limit(value: float) -> str:
-    """Write a limit of the refinement: a number, or the sign for none.
-
-    Examples
-    --------
-    >>> limit(2.0), limit(0.5), limit(float("inf"))
-    ('2', '0.5', '∞')
-    """
-    return "∞" if np.isinf(value) else f"{value:g}"
-
-
 def _draw_choices(ax: Axes, curves: DataFrame, n_models: float) -> list[EndLabel]:
     """Draw the curves of one sampling and ``N_interp``, and the discrete extrema dotted."""
     curve_axes(ax)
     ax.set(xlabel="", ylabel="")
     place = {"transform": ax.transAxes, "fontsize": style.SMALL}
-    ax.text(0.05, 0.07, f"{N_INTERP} = {limit(n_models)}", **place)
+    ax.text(0.05, 0.07, f"{N_INTERP} = {style.limit(n_models)}", **place)
     discrete = curves[curves["detections"] == "discrete"]
     dots: dict[str, Any] = {"linestyle": (0, (1.0, 1.2)), "zorder": 4}
     labels = [curve(ax, discrete, palette.DETECTION_COLOURS["discrete"], "discrete", **dots)]
@@ -140,7 +129,7 @@ def _draw_choices(ax: Axes, curves: DataFrame, n_models: float) -> list[EndLabel
     for max_offset in sorted(refined["max_offset"].unique()):
         rows = refined[refined["max_offset"] == max_offset]
         colour = palette.offset_colour(max_offset)
-        labels.append(curve(ax, rows, colour, limit(max_offset), linewidth=1.2))
+        labels.append(curve(ax, rows, colour, style.limit(max_offset), linewidth=1.2))
     return labels
 
 
@@ -165,13 +154,13 @@ def _draw_counts(ax: Axes, counts: DataFrame) -> list[EndLabel]:
             shift = offsets.index(row["max_offset"]) - (len(offsets) - 1) / 2
             x = left + models.index(row["max_iterations"]) + 0.18 * shift
             line: dict[str, Any] = {"color": palette.offset_colour(row["max_offset"])}
-            label = f"{n_spo} {limit(row['max_offset'])} {limit(row['max_iterations'])}"
+            label = f"{n_spo} {style.limit(row['max_offset'])} {style.limit(row['max_iterations'])}"
             ax.plot([x, x], [row["n_always"], row["n_unique"]], linewidth=0.6, **line)
             ax.plot(x, row["n_unique"], "_", markersize=4.0, label=f"{label}, any", **line)
             ax.plot(x, row["n_always"], "o", markersize=4.0, label=label, **line)
     lefts = (len(models) + 0.5) * np.arange(len(blocks))
     ticks = (lefts[:, None] + np.arange(len(models))).ravel()
-    ax.set_xticks(ticks, [limit(n_models) for n_models in models] * len(blocks))
+    ax.set_xticks(ticks, [style.limit(n_models) for n_models in models] * len(blocks))
     ax.set_xlim(-0.7, ends[1] + 0.05)
     ax.set_ylim(0, 1.2 * counts["n_unique"].max())
     ax.set(xlabel=N_INTERP, ylabel="unique keypoints")

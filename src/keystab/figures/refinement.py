@@ -8,7 +8,6 @@ import numpy as np
 
 from keystab.figures import palette, style
 from keystab.figures._render import Tables, check_tables, main
-from keystab.figures.fig7 import limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -128,7 +127,7 @@ def _name_offsets(ax: Axes, offsets: list[float]) -> None:
     ax.text(1.02, 0.97, "$M_{\\mathrm{offset}}$", **place)
     for line, offset in enumerate(offsets, 1):
         colour = palette.offset_colour(offset)
-        ax.text(1.02, 0.97 - 0.1 * line, limit(offset), color=colour, **place)
+        ax.text(1.02, 0.97 - 0.1 * line, style.limit(offset), color=colour, **place)
 
 
 def _name_ways(ax: Axes) -> None:

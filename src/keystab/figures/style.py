@@ -260,6 +260,17 @@ def _label_log_axis(axis: Any, low: float, high: float) -> None:
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
+def limit(value: float) -> str:
+    """Write a limit of the refinement: a number, or the sign for none.
+
+    Examples
+    --------
+    >>> limit(2.0), limit(0.5), limit(float("inf"))
+    ('2', '0.5', '∞')
+    """
+    return "∞" if np.isinf(value) else f"{value:g}"
+
+
 def sampling_axis(ax: Axes, samplings: Iterable[int]) -> None:
     """Make the horizontal axis one of scales per octave, with a tick at every or every other one.
 

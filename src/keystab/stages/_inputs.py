@@ -131,23 +131,13 @@ def comparable_only(
     scale_column: str = "step_sigma",
 ) -> pd.DataFrame:
     """Select the detections that `keystab.comparison.comparable` says are compared."""
-    return detections[
-        comparable(
-            detections,
-            shape,
-            args.sigma_min,
-            args.first_scale,
-            args.border,
-            scale_column,
-            args.last_scale,
-        )
-    ]
+    return detections[compared(args, shape)(detections, scale_column)]
 
 
-def octave_of_view(
+def compared(
     args: argparse.Namespace, shape: tuple[int, int]
 ) -> Callable[[pd.DataFrame, str], NDArray[np.bool_]]:
-    """Say which rows of a table, by the scale in one of its columns, are compared with truth."""
+    """Say which rows of a table, by the scale in one of its columns, are compared."""
 
     def inside(table: pd.DataFrame, scale_column: str) -> NDArray[np.bool_]:
         return comparable(
@@ -171,7 +161,7 @@ def judged_in_octave(
     scale_column: str,
 ) -> dict[str, Any]:
     """Hold detections against true extrema in the range that is compared."""
-    inside = octave_of_view(args, shape)
+    inside = compared(args, shape)
     finite = with_positions(found)
     return judged(
         finite, truth, inside(finite, scale_column), inside(truth, "sigma"), **tolerances(args)
@@ -185,7 +175,7 @@ def tolerances(args: argparse.Namespace) -> dict[str, float]:
 
 def same_options(args: argparse.Namespace) -> dict[str, Any]:
     """Collect the options of `keystab.duplicates.same`."""
-    return {name: getattr(args, name) for name in ("space_tolerance", "scale_ratio", "match_sign")}
+    return {**tolerances(args), "match_sign": args.match_sign}
 
 
 def positions_of_matches(matches: pd.DataFrame, extrema: pd.DataFrame) -> NDArray[np.intp]:

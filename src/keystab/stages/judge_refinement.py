@@ -28,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.dog_space import scale_space
     from keystab.judgement import kept_and_lost
     from keystab.refinement import MOST_MODELS, trace
-    from keystab.stages._inputs import octave_of_view, read_view, tolerances
+    from keystab.stages._inputs import compared, read_view, tolerances
     from keystab.tables import read_table, write_table
 
     view, truth = read_view(args.views, args.views_digest), read_table(args.truth)
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             view.image, view.blur, n_spo, None, args.sigma_min, args.kappa, args.oversampling
         )
         extrema = read_table(path)
-        inside = octave_of_view(args, view.shape)
+        inside = compared(args, view.shape)
         paths = {}
         for scale_moves in (True, False):
             nearest = trace(space, extrema, min(args.max_offsets), "nearest", scale_moves)

@@ -25,7 +25,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.refinement import accepted, positions
+    from keystab.refinement import refined_table
     from keystab.sampling import Sampling, balanced_delta
     from keystab.stages._inputs import judged_in_octave, read_view
     from keystab.tables import read_table, write_table
@@ -38,9 +38,9 @@ def main(argv: Sequence[str] | None = None) -> None:
         extrema = read_table(extrema_path)
         step = balanced_delta(n_spo, args.kappa, args.sigma_min)
         sampling = Sampling(view.shape, view.blur, n_spo, step, args.sigma_min, args.kappa)
-        models = accepted(read_table(traces_path), args.max_offset, args.max_iterations)
-        refined = positions(models, sampling)
-        refined["sign"] = extrema["sign"].to_numpy()[models["keypoint"].to_numpy()]
+        refined = refined_table(
+            sampling, extrema, read_table(traces_path), args.max_offset, args.max_iterations
+        )
         labels = {"oversampling": args.oversampling, "n_spo": n_spo, "delta_min": step}
         for name, found, scale in (
             ("discrete", extrema, "step_sigma"),

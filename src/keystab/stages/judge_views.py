@@ -28,6 +28,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
 
+    from functools import cache
+
     import numpy as np
     import pandas as pd
 
@@ -40,18 +42,20 @@ def main(argv: Sequence[str] | None = None) -> None:
     seen_from = read_views(args.views, args.views_digest).specs[0]
     scene = read_table(args.truth)
     limits = args.sigma_min * np.array([args.first_scale, args.last_scale])
+
+    @cache  # a set is there once for every sampling
+    def seen(store: Path, digest: Path, guard: float) -> tuple[CommonRange, pd.DataFrame]:
+        views = read_views(store, digest)
+        first = CommonRange([views.specs[0], seen_from], views.reference_shape, 0.0, 0.0)
+        field = CommonRange(views.specs, views.reference_shape, max(guard, args.border), 0.0)
+        return field, field.common(first.common(scene.assign(view=1)).assign(view=0))
+
     rows = []
     for sweep, value, n_spo, guard, store, digest, extrema, traces in zip(
         args.sweeps, args.values, args.n_spo, args.guards, args.sets, args.sets_digest,
         args.extrema, args.traces, strict=True,
     ):  # fmt: skip
-        views = read_views(store, digest)
-        margin = max(guard, args.border)
-        field = CommonRange(views.specs, views.reference_shape, margin, 0.0)
-        truth = CommonRange(
-            [views.specs[0], seen_from], views.reference_shape, 0.0, 0.0
-        ).common(scene.assign(view=1))  # fmt: skip
-        truth = field.common(truth.assign(view=0))
+        field, truth = seen(store, digest, guard)
         found = read_table(extrema)
         for detections, table, scale in (
             ("discrete", found, "step_sigma"),
@@ -62,7 +66,9 @@ def main(argv: Sequence[str] | None = None) -> None:
             ),
         ):
             common = field.common(table, scale)
-            judgement = mean_over_views(common, truth, len(views), limits, scale, tolerances(args))
+            judgement = mean_over_views(
+                common, truth, len(field.specs), limits, scale, tolerances(args)
+            )
             labels = {"sweep": sweep, "value": value, "n_spo": n_spo, "detections": detections}
             rows.append(labels | judgement)
     table = pd.DataFrame(rows)
