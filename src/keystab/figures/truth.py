@@ -160,7 +160,8 @@ def _draw_errors(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> N
             other["n_spo"], other[f"median_{name}"], "o", color=colour, markerfacecolor="none",
             markersize=4.0, label=f"{detections}, cosine",
         )  # fmt: skip
-    values = np.concatenate([spline[f"{q}_{name}"] for q in ("median", "p90")])
+    drawn = [spline[f"{q}_{name}"] for q in ("median", "p90")]
+    values = np.concatenate([*drawn, cosine[f"median_{name}"]])
     values = values[values > 0]
     style.log_y_axis(ax, 0.6 * values.min(), 2.5 * values.max())
     if name == "location":
@@ -257,7 +258,7 @@ def _draw_areas(ax: Axes, table: DataFrame) -> None:
     ax.axvline(0.5, color=palette.GREY, linewidth=0.7, linestyle=":")
     ax.set_yticks(place, [style.FEATURE_NAMES[name] for name in features])
     ax.set(xlim=(0.4, 1.0), ylim=(len(features) - 0.5, -0.6))
-    ax.set_xlabel("ROC area (open: stability, full: truth)")
+    ax.set_xlabel("area under the ROC curve\n(open: stability, full: truth)")
     style.finish_axes(ax)
 
 
