@@ -16,6 +16,6 @@ from keystab.extrema import extrema_of_array  # noqa: E402
 if __name__ == "__main__":
     picture = np.random.default_rng(0).random((40, 40))
     for oversampling in ("spline", "cosine"):
-        detect_keypoints(picture, 0.5, n_spo=8, oversampling=oversampling)
-    detect_keypoints(picture, 1.1, n_spo=12)  # searched from few samples
+        detect_keypoints(picture, 0.5, n_spo=4, oversampling=oversampling)
+        detect_keypoints(picture, 1.1, n_spo=12, oversampling=oversampling)  # from few samples
     extrema_of_array(np.zeros((3, 3, 3)), 0.0)

@@ -18,8 +18,10 @@ import numpy as np
 import threadpoolctl
 from numba import njit
 
-from keystab import checks, interpolated_search, memory
+from keystab import band_limited_search, checks, interpolated_search, memory
+from keystab.band_limited_search import BandLimitedSearch
 from keystab.dog_space import ScaleSpace, ranges
+from keystab.interpolated_search import InterpolatedSearch
 from keystab.operators import Block
 from keystab.progress import progress
 
@@ -79,8 +81,13 @@ def discrete_extrema(
     space.source, space.axes, space.blurs  # noqa: B018  made once, before threads share them
     what = f"extrema, n_spo {space.sampling.n_spo}" if show_progress else None
     with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
-        search = _interpolated if interpolated_search.applies(space) else _evaluated
-        found = search(space, tolerance, pool, what, inner_window(space, window))
+        searched = inner_window(space, window)
+        if interpolated_search.applies(space):
+            found = _interpolated(InterpolatedSearch(space, tolerance, *searched), pool, what)
+        elif band_limited_search.applies(space):
+            found = _interpolated(BandLimitedSearch(space, tolerance, *searched), pool, what)
+        else:
+            found = _evaluated(space, tolerance, pool, what, searched)
     extrema = within(np.concatenate([np.empty((0, 4), dtype=np.int64), *found]), window)
     return extrema[np.lexsort((extrema[:, 2], extrema[:, 1], extrema[:, 0]))]
 
@@ -127,21 +134,16 @@ def _evaluated(
 
 
 def _interpolated(
-    space: ScaleSpace,
-    tolerance: float,
-    pool: ThreadPoolExecutor,
-    what: str | None,
-    window: tuple[slice, slice],
+    search: InterpolatedSearch | BandLimitedSearch, pool: ThreadPoolExecutor, what: str | None
 ) -> list[np.ndarray]:
-    """Extrema from few samples and a bound on what lies between; see `interpolated_search`."""
-    search = interpolated_search.InterpolatedSearch(space, tolerance, *window)
+    """Extrema from few samples and a bound on what lies between."""
     searches = pool.map(partial(_search_interpolated, search), range(search.n_columns))
     found = list(progress(searches, search.n_columns, what) if what else searches)
     # Columns of blocks overlap by the samples that have no neighbours in one of them.
     return [np.unique(np.concatenate(found), axis=0)]
 
 
-def _search_interpolated(search: interpolated_search.InterpolatedSearch, column: int) -> np.ndarray:
+def _search_interpolated(search: InterpolatedSearch | BandLimitedSearch, column: int) -> np.ndarray:
     """Extrema of one column of blocks: candidates, and what has too many of them, decided."""
     space, tolerance = search.space, search.tolerance
     candidates, undecided = search.candidates(column)

@@ -26,6 +26,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from keystab.block_rows import AxisBlocks, axis_blocks, expansion, whole_rows
+from keystab.block_scan import ROOM, SINGLE_ROUNDING, difference, gathered, scan, starts_of
 from keystab.dog_space import ScaleSpace
 from keystab.operators import SplineAxis
 
@@ -45,9 +46,6 @@ _SMOOTH = 1.3
 # polynomial follows: they are evaluated at all samples.
 _KINKED = 0.6
 
-# Relative error of single precision.
-_UNIT = 2.0**-24
-
 
 def applies(space: ScaleSpace) -> bool:
     """Whether a scale-space is sampled finely enough, and its rows are local."""
@@ -66,16 +64,6 @@ def block_length(space: ScaleSpace) -> int:
     """Samples of a block along either axis."""
     sampling = space.sampling
     return min(48, int(_LENGTH * sampling.sigma_min / sampling.delta_min))
-
-
-def starts_of(wanted: slice, n_samples: int, length: int) -> tuple[int, ...]:
-    """First samples of the blocks in which the wanted samples of an axis have both neighbours.
-
-    Samples at the rim of a block have none, so that blocks overlap by two; the last may overlap
-    more where the axis ends.
-    """
-    starts = np.arange(wanted.start - 1, max(wanted.stop - 1, wanted.start), length - 2)
-    return tuple(int(start) for start in np.unique(np.minimum(starts, n_samples - length)))
 
 
 def error_bounds(
@@ -202,10 +190,10 @@ class InterpolatedSearch:
             rows, left = self.x_rows.rows(column, k)
             whole[k] = source[:, left : left + rows.shape[1]] @ rows.T
         single = expand.astype(np.float32)
-        found = np.empty((256 * self.y_blocks.start.size, 4), dtype=np.int64)
+        found = np.empty((self.y_blocks.start.size, ROOM, 4), dtype=np.int64)
         counts = np.empty(self.y_blocks.start.size, dtype=np.int64)
         # Sums of n products in single precision err by n units of the sum of their sizes.
-        rounding = 2 * (nodes.size + 3) * _UNIT * np.abs(expand).sum(axis=1).max() ** 2
+        rounding = 2 * (nodes.size + 3) * SINGLE_ROUNDING * np.abs(expand).sum(axis=1).max() ** 2
         _search(
             strips,
             self.y_blocks.first,
@@ -229,12 +217,7 @@ class InterpolatedSearch:
             found,
             counts,
         )
-        parts = [found[256 * i : 256 * i + count] for i, count in enumerate(counts) if count <= 256]
-        undecided = [
-            (int(self.y_blocks.start[i]), self.x_starts[column])
-            for i in np.flatnonzero(counts > 256)
-        ]
-        return np.concatenate([np.empty((0, 4), dtype=np.int64), *parts]), undecided
+        return gathered(found, counts, self.y_blocks.start, self.x_starts[column])
 
 
 @njit(cache=True, nogil=True)
@@ -261,7 +244,7 @@ def _search(  # noqa: PLR0913
     found,
     counts,
 ):
-    """Search one column of blocks from top to bottom; 256 candidates have room per block."""
+    """Search one column of blocks from top to bottom."""
     length, n_nodes = expand.shape
     n_slices, n_blurs, across = lower.size, strips.shape[0], strips.shape[2]
     abreast = across // n_nodes
@@ -286,93 +269,19 @@ def _search(  # noqa: PLR0913
             strip = whole[k, top : top + n]
             np.dot(rows, strip, every[k])
             # A sum of n products, of numbers that were rounded; absolute rows add up to below two.
-            whole_error[k] = 2 * (n + 4) * _UNIT * np.abs(strip).max()
+            whole_error[k] = 2 * (n + 4) * SINGLE_ROUNDING * np.abs(strip).max()
         for s in range(n_kinked):
-            error[s] = _UNIT * _difference(every[whole_upper[s]], every[whole_lower[s]], dog[s])
+            error[s] = SINGLE_ROUNDING * difference(
+                every[whole_upper[s]], every[whole_lower[s]], dog[s]
+            )
             error[s] += whole_error[whole_upper[s]] + whole_error[whole_lower[s]]
         for s in range(n_kinked, n_slices):
             high, low = gaussians[upper[s]], gaussians[lower[s]]
-            error[s] = bounds[i, s] + rounding * _difference(high, low, nodes)
+            error[s] = bounds[i, s] + rounding * difference(high, low, nodes)
             np.dot(expand, nodes, half)
             np.dot(
                 half.reshape(length * abreast, n_nodes),
                 expand_t,
                 dog[s].reshape(length * abreast, length),
             )
-        counts[i] = _scan(dog, error, tolerance, starts[i], left, found[256 * i : 256 * (i + 1)])
-
-
-@njit(cache=True, nogil=True)
-def _difference(high, low, out):
-    """Write ``high - low`` in single precision; return its largest absolute value."""
-    largest = 0.0
-    for y in range(out.shape[0]):
-        for x in range(out.shape[1]):
-            value = high[y, x] - low[y, x]
-            largest = max(largest, abs(value))
-            out[y, x] = value
-    return largest
-
-
-@njit(cache=True, nogil=True)
-def _scan(dog, error, tolerance, top, left, found):
-    """Write samples that may be extrema, given how far each slice may be off."""
-    n_slices, n_rows, n_columns = dog.shape
-    count = 0
-    slack = np.empty(3, dtype=np.float32)
-    for s in range(1, n_slices - 1):
-        for ds in range(3):
-            slack[ds] = (tolerance - error[s] - error[s - 1 + ds]) * (1 - 1e-6) - 1e-30
-        for y in range(1, n_rows - 1):
-            here, above, below = dog[s, y], dog[s, y - 1], dog[s, y + 1]
-            finer, coarser = dog[s - 1, y], dog[s + 1, y]
-            slack_f, slack_h, slack_c = slack
-            any_here = 0
-            for x in range(1, n_columns - 1):
-                low, high = here[x] - slack_h, here[x] + slack_h
-                maximum = (
-                    (here[x - 1] < low)
-                    & (here[x + 1] < low)
-                    & (above[x] < low)
-                    & (below[x] < low)
-                    & (finer[x] < here[x] - slack_f)
-                    & (coarser[x] < here[x] - slack_c)
-                )
-                minimum = (
-                    (here[x - 1] > high)
-                    & (here[x + 1] > high)
-                    & (above[x] > high)
-                    & (below[x] > high)
-                    & (finer[x] > here[x] + slack_f)
-                    & (coarser[x] > here[x] + slack_c)
-                )
-                any_here |= maximum | minimum
-            if any_here:
-                for x in range(1, n_columns - 1):
-                    if _may_be(dog, s, y, x, slack):
-                        if count < found.shape[0]:
-                            found[count, 0] = s
-                            found[count, 1] = top + y
-                            found[count, 2] = left + x
-                            found[count, 3] = 0
-                        count += 1
-    return count
-
-
-@njit(cache=True, nogil=True)
-def _may_be(dog, s, y, x, slack):
-    """Whether a sample exceeds, or falls short of, all 26 neighbours by more than the slack."""
-    value = dog[s, y, x]
-    above, below = True, True
-    for ds in range(-1, 2):
-        low, high = value - slack[ds + 1], value + slack[ds + 1]
-        for dy in range(-1, 2):
-            for dx in range(-1, 2):
-                if ds == 0 and dy == 0 and dx == 0:
-                    continue
-                other = dog[s + ds, y + dy, x + dx]
-                above = above and other < low
-                below = below and other > high
-                if not (above or below):
-                    return False
-    return True
+        counts[i] = scan(dog, error, tolerance, starts[i], left, found[i])

@@ -8,6 +8,7 @@ scale-space was cut up.
 from __future__ import annotations
 
 import numpy as np
+import threadpoolctl
 from numba import njit
 
 from keystab.operators import AxisOperator, CosineAxis, SplineAxis, fill_rows
@@ -58,19 +59,21 @@ def cosine_neighbourhoods(
     assert isinstance(y_axis, CosineAxis) and isinstance(x_axis, CosineAxis)
     cubes = np.zeros((s.size, 3, 3, 3))
     around = np.arange(-1, 2)
-    for start in range(0, s.size, _BATCH):
-        part = slice(start, start + _BATCH)
-        _cosine_cubes(
-            source,
-            y_axis.basis(row[part, None] + around),
-            x_axis.basis(column[part, None] + around),
-            y_axis.gains,
-            x_axis.gains,
-            lower,
-            upper,
-            s[part],
-            cubes[part],
-        )
+    # One thread: digits must not depend on the cores, and the products are too small to share.
+    with threadpoolctl.threadpool_limits(1):
+        for start in range(0, s.size, _BATCH):
+            part = slice(start, start + _BATCH)
+            _cosine_cubes(
+                source,
+                y_axis.basis(row[part, None] + around),
+                x_axis.basis(column[part, None] + around),
+                y_axis.gains,
+                x_axis.gains,
+                lower,
+                upper,
+                s[part],
+                cubes[part],
+            )
     return cubes
 
 
@@ -111,13 +114,13 @@ def _cosine_cubes(source, y_basis, x_basis, y_gains, x_gains, lower, upper, s, c
             for pair in range(2):
                 blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
                 for b in range(3):
-                    for e in range(3):
-                        total = 0.0
-                        for j in range(n_x):
-                            total += lines[6 * a + 3 * pair + b, j] * (
-                                x_basis[k, e, j] * x_gains[blur, j]
-                            )
-                        cubes[k, a, b, e] += total if pair == 0 else -total
+                    for j in range(n_x):
+                        lines[6 * a + 3 * pair + b, j] *= x_gains[blur, j]
+        values = np.dot(lines, x_basis[k].T)
+        for a in range(3):
+            for b in range(3):
+                for e in range(3):
+                    cubes[k, a, b, e] = values[6 * a + b, e] - values[6 * a + 3 + b, e]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})

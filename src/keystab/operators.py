@@ -275,7 +275,7 @@ def cosine_domain_kernel(n_samples: int, blur: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def band_limited_basis(n_samples: int, spacing: float) -> np.ndarray | None:
+def band_limited_basis(n_samples: int, spacing: float, faint: float = 1e-16) -> np.ndarray | None:
     """Orthonormal basis of band-limited functions on an interval.
 
     Parameters
@@ -284,12 +284,14 @@ def band_limited_basis(n_samples: int, spacing: float) -> np.ndarray | None:
         Samples of the interval.
     spacing : float
         Their distance in pixels; the band limit is half a cycle per pixel.
+    faint : float
+        Singular value, of the largest, below which a direction is left out.
 
     Returns
     -------
     ndarray, shape (n_samples, rank), or None
-        Columns that span every such function to the last digit; None where that takes about as
-        many as there are samples.
+        Columns that span every such function, by default to the last digit; None where that takes
+        about as many as there are samples.
     """
     span = (n_samples - 1) * spacing
     # Frequencies dense enough that the waves between them add nothing new to the interval.
@@ -297,7 +299,7 @@ def band_limited_basis(n_samples: int, spacing: float) -> np.ndarray | None:
     phase = np.multiply.outer((np.arange(n_samples) - (n_samples - 1) / 2) * spacing, frequency)
     waves = np.hstack([np.cos(phase), np.sin(phase)])
     left, singular, _ = np.linalg.svd(waves, full_matrices=False)
-    rank = int((singular > 1e-16 * singular[0] * np.sqrt(n_samples)).sum())
+    rank = int((singular > faint * singular[0] * np.sqrt(n_samples)).sum())
     return np.ascontiguousarray(left[:, :rank]) if rank < 0.7 * n_samples else None
 
 

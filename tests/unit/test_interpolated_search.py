@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import blobs
 
-from keystab import extrema, interpolated_search
+from keystab import band_limited_search, extrema, interpolated_search
+from keystab.band_limited_search import BandLimitedSearch
 from keystab.dog_space import scale_space
 from keystab.interpolated_search import InterpolatedSearch, applies, error_bounds, expansion
 
@@ -18,7 +19,7 @@ from keystab.interpolated_search import InterpolatedSearch, applies, error_bound
 def both(image, n_spo, epsilon=0.0, camera_blur=1.1, **options):
     """Extrema of the two searches."""
     space = scale_space(image, camera_blur, n_spo, **options)
-    assert applies(space)
+    assert applies(space) or band_limited_search.applies(space)
     tolerance = max(epsilon, space.rounding)
     with ThreadPoolExecutor(1) as pool:
         dense = np.concatenate(
@@ -45,8 +46,9 @@ def scene(kind: str) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["blobs", "noise", "faint", "edge", "flat and strong"])
 @pytest.mark.parametrize("n_spo", [12, 15])
-def test_every_extremum_is_found(kind, n_spo):
-    found, dense = both(scene(kind), n_spo)
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
+def test_every_extremum_is_found(kind, n_spo, oversampling):
+    found, dense = both(scene(kind), n_spo, oversampling=oversampling)
     assert found.tolist() == dense.tolist()
     assert len(dense) > (7 if kind == "blobs" else -1)
 
@@ -65,16 +67,22 @@ def test_every_extremum_is_found(kind, n_spo):
     ],
     ids=str,
 )
-def test_whatever_the_sampling(options):
-    found, dense = both(blobs((58, 63), 2), 15, **options)
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
+def test_whatever_the_sampling(options, oversampling):
+    found, dense = both(blobs((58, 63), 2), 15, oversampling=oversampling, **options)
     assert found.tolist() == dense.tolist()
     assert len(dense) > 5
 
 
 @settings(max_examples=4, deadline=None)
-@given(st.integers(0, 10**6), st.integers(26, 40), st.integers(26, 40))
-def test_whatever_the_picture(seed, height, width):
-    found, dense = both(blobs((height, width), seed), 14)
+@given(
+    st.integers(0, 10**6),
+    st.integers(26, 40),
+    st.integers(26, 40),
+    st.sampled_from(["spline", "cosine"]),
+)
+def test_whatever_the_picture(seed, height, width, oversampling):
+    found, dense = both(blobs((height, width), seed), 14, oversampling=oversampling)
     assert found.tolist() == dense.tolist()
 
 
@@ -103,6 +111,27 @@ def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
     assert reached > 1e-3
 
 
+@pytest.mark.parametrize("kind", ["blobs", "noise", "edge"])
+@pytest.mark.parametrize("n_spo", [12, 15])
+def test_the_bound_of_band_limited_interpolation_holds(kind, n_spo):
+    space = scale_space(scene(kind), 1.1, n_spo, oversampling="cosine")
+    search = BandLimitedSearch(space, 0.0, *extrema.inner_window(space))
+    dog = space.window()
+    (y_nodes, along), (x_nodes, across) = (
+        band_limited_search.interpolation(length, space.sampling.step)
+        for length in (search.length, search.abreast)
+    )
+    reached = 0.0
+    for top in search.y_starts:
+        for left in search.x_starts:
+            box = dog[:, top : top + search.length, left : left + search.abreast]
+            interpolated = along @ box[:, y_nodes][:, :, x_nodes] @ across.T
+            off = np.abs(interpolated - box).max(axis=(1, 2))
+            assert (off <= search.bounds + 1e-14).all()
+            reached = max(reached, (off / search.bounds).max())
+    assert reached > 1e-3
+
+
 def test_blocks_with_too_many_candidates_are_evaluated(monkeypatch):
     monkeypatch.setattr(interpolated_search, "_KINKED", 0.0)  # slice 1 is then all candidates
     image = blobs((31, 43), 3)
@@ -113,12 +142,12 @@ def test_blocks_with_too_many_candidates_are_evaluated(monkeypatch):
     assert found.tolist() == dense.tolist()
 
 
-def test_coarse_small_and_cosine_scale_spaces_are_not_interpolated():
+def test_coarse_and_small_scale_spaces_are_not_interpolated():
     image = blobs((40, 40), 4)
-    assert applies(scale_space(image, 1.1, 15))
-    assert not applies(scale_space(image, 1.1, 5))
-    assert not applies(scale_space(image[:9, :9], 1.1, 15))
-    assert not applies(scale_space(image, 1.1, 15, oversampling="cosine"))
+    for oversampling, asked in (("spline", applies), ("cosine", band_limited_search.applies)):
+        assert asked(scale_space(image, 1.1, 15, oversampling=oversampling))
+        assert not asked(scale_space(image, 1.1, 3, oversampling=oversampling))
+        assert not asked(scale_space(image[:9, :9], 1.1, 15, oversampling=oversampling))
 
 
 @pytest.mark.parametrize("n_spo", [5, 15])
