@@ -185,11 +185,14 @@ def precision(ax: Axes, table: DataFrame, quantity: str, medians: bool = False) 
             ax.plot(n_spo, median, "--", color=colour, label=f"{detections}, median", linewidth=0.8)
             lower = np.fmin(lower, median)
         if len(rows):
-            above = np.where(upper > 0, upper, mean)
-            above = np.where(above > 0, above, 1e-9)
-            below = np.linspace(0.35 * n_spo[0] + 0.65 * n_spo[-1], n_spo[-1])  # the name
-            height = np.exp(np.interp(below, n_spo, np.log(above))).max()
-            style.direct_label(ax, n_spo[-1], height, detections, colour, up=5.0)
+            # The name stands above its curve; below the lower one, unless its median is there.
+            beneath = detections == "refined" and not medians
+            edge = lower if beneath else upper
+            edge = np.where(edge > 0, edge, np.where(mean > 0, mean, 1e-9))
+            beside = np.linspace(0.35 * n_spo[0] + 0.65 * n_spo[-1], n_spo[-1])
+            heights = np.exp(np.interp(beside, n_spo, np.log(edge)))
+            height, up = (heights.min(), -6.0) if beneath else (heights.max(), 5.0)
+            style.direct_label(ax, n_spo[-1], height, detections, colour, up=up)
         seen = np.concatenate([mean, lower, upper])
         seen = seen[seen > 0]
         if seen.size:
@@ -199,7 +202,7 @@ def precision(ax: Axes, table: DataFrame, quantity: str, medians: bool = False) 
     if medians:
         place = {"transform": ax.transAxes, "color": palette.GREY, "fontsize": style.SMALL}
         ax.text(0.04, 0.03, "dashed: median", **place)
-    style.log_y_axis(ax, 0.8 * lowest, 1.6 * highest)
+    style.log_y_axis(ax, (0.8 if medians else 0.55) * lowest, 1.6 * highest)
     ax.set_ylabel(QUANTITIES[quantity][1])
     style.sampling_axis(ax, table["n_spo"])
     style.finish_axes(ax)

@@ -209,14 +209,14 @@ def _draw_rule(ax: Axes, comparisons: Sequence[Comparison], colours: Colours) ->
         ax.plot([half[0]] * 2, whole[1:], color=colour, linewidth=1.0, label="interval")
         ax.plot(half[1:], [whole[0]] * 2, color=colour, linewidth=1.0, label="interval")
         ax.plot([half[0]], [whole[0]], "o", color=colour, markersize=4.0, label=f"{noise:g}")
-        place: dict[str, Any] = {"right": 3.0, "up": 2.0, "ha": "left", "va": "bottom"}
-        style.direct_label(ax, half[0], whole[0], f"{noise:g}", colour, **place)
+        # To the right of the intervals: near the origin, those of the strongest noises meet.
+        style.direct_label(ax, half[2], whole[0], f"{noise:g}", colour, right=4.0, ha="left")
     if not comparisons:
         text = "nothing to compare"
-        place = {"transform": ax.transAxes, "ha": "center", "fontsize": style.SMALL}
+        place: dict[str, Any] = {"transform": ax.transAxes, "ha": "center", "fontsize": style.SMALL}
         ax.text(0.5, 0.5, text, color=palette.GREY, **place)
     ticks = range(0, 101, 25)
-    ax.set(xlim=(0, 102), ylim=(0, 102), xticks=ticks, yticks=ticks)
+    ax.set(xlim=(-4, 102), ylim=(-4, 102), xticks=ticks, yticks=ticks)
     ax.set_xlabel("first octave, half the noise (%)")
     ax.set_ylabel("second octave (%)")
     style.finish_axes(ax)
