@@ -177,10 +177,10 @@ def extrema_table(space: ScaleSpace, extrema: np.ndarray) -> pd.DataFrame:
     around = cubes.reshape(-1, 27)[:, _NEIGHBOURS]
     gradient, hessian = quadratic_model(cubes)
     alpha = stationary_point(gradient, hessian)
-    models = pd.DataFrame({"s": s, "row": row, "column": column})
-    models[["alpha_s", "alpha_y", "alpha_x"]] = alpha
+    offsets = dict(zip(("alpha_s", "alpha_y", "alpha_x"), alpha.T, strict=True))
+    models = pd.DataFrame({"s": s, "row": row, "column": column, **offsets})
     step = positions(models, space.sampling)
-    table = pd.DataFrame(
+    return pd.DataFrame(
         {
             "y": row * space.sampling.step,
             "x": column * space.sampling.step,
@@ -191,15 +191,12 @@ def extrema_table(space: ScaleSpace, extrema: np.ndarray) -> pd.DataFrame:
             "row": row,
             "column": column,
             "difference": np.abs(around - value[:, None]).min(axis=1, initial=np.inf),
+            **{name: gradient[:, i] for name, i in GRADIENT_COLUMNS.items()},
+            **{name: hessian[:, i, j] for name, (i, j) in HESSIAN_COLUMNS.items()},
+            **{f"step_{name}": step[name] for name in ("y", "x", "sigma")},
+            "step_value": value + 0.5 * np.einsum("ni,ni->n", gradient, alpha),
         }
     )
-    for name, i in GRADIENT_COLUMNS.items():
-        table[name] = gradient[:, i]
-    for name, (i, j) in HESSIAN_COLUMNS.items():
-        table[name] = hessian[:, i, j]
-    table[["step_y", "step_x", "step_sigma"]] = step[["y", "x", "sigma"]]
-    table["step_value"] = value + 0.5 * np.einsum("ni,ni->n", gradient, alpha)
-    return table
 
 
 def without_seams(octaves: list[pd.DataFrame], n_spo: int, sigma_min: float) -> list[np.ndarray]:

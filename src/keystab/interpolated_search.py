@@ -77,48 +77,47 @@ def error_bounds(
     """
     blurs, lower, upper = space.blurs
     source = space.source
-    absolute = np.abs(source)
-    changes = [np.abs(np.diff(source, 4, axis=axis)) for axis in (0, 1)]
-    overall = [float(a.max(initial=0.0)) for a in (absolute, *changes)]
-    n_y, n_x = y_blocks.start.size, -(-x_blocks.start.size // _ABREAST)
+    parts = [np.abs(source), *(np.abs(np.diff(source, 4, axis=axis)) for axis in (0, 1))]
+    overall = [float(part.max(initial=0.0)) for part in parts]
+    n_y, n_x = y_blocks.start.size, x_blocks.start.size // _ABREAST
     bound = np.empty((n_y, n_x, blurs.size))
-    groups = [slice(k * _ABREAST, (k + 1) * _ABREAST) for k in range(n_x)]
+    n_local = int(np.searchsorted(blurs, _SMOOTH))  # blurs ascend
+    local = [_local_maxima(part, y_blocks, x_blocks, n_local) for part in parts]
 
-    def worst(values: NDArray[np.float64], blur: int) -> NDArray[np.float64]:
-        return np.array([values[group, blur].max() for group in groups])
+    def worst(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return values.reshape(n_x, _ABREAST).max(axis=1)
 
     for blur in range(blurs.size):
-        if blurs[blur] < _SMOOTH:
-            rows = _ranges(y_blocks.first[:, blur], y_blocks.width[:, blur])
-            columns = [
-                (
-                    int(x_blocks.first[group, blur].min()),
-                    int((x_blocks.first[group, blur] + x_blocks.width[group, blur]).max()),
-                )
-                for group in groups
-            ]
-            level, along_y, along_x = (
-                _local_maxima(values, rows, columns) for values in (absolute, *changes)
-            )
+        if blur < n_local:
+            level, along_y, along_x = (maxima[blur] for maxima in local)
         else:
             level, along_y, along_x = (np.full((n_y, n_x), value) for value in overall)
         e_y = y_blocks.smooth[:, blur, None] * along_y + y_blocks.rough[:, blur, None] * level
-        e_x = worst(x_blocks.smooth, blur) * along_x + worst(x_blocks.rough, blur) * level
-        bound[:, :, blur] = worst(x_blocks.norm, blur) * e_y
+        e_x = worst(x_blocks.smooth[:, blur]) * along_x + worst(x_blocks.rough[:, blur]) * level
+        bound[:, :, blur] = worst(x_blocks.norm[:, blur]) * e_y
         bound[:, :, blur] += (y_blocks.norm[:, blur] + y_blocks.residual[:, blur])[:, None] * e_x
     return bound[:, :, lower] + bound[:, :, upper]
 
 
-def _ranges(first: NDArray[np.int64], width: NDArray[np.int64]) -> list[tuple[int, int]]:
-    return [(int(a), int(a + n)) for a, n in zip(first, width, strict=True)]
-
-
-def _local_maxima(
-    values: NDArray[np.float64], rows: list[tuple[int, int]], columns: list[tuple[int, int]]
-) -> NDArray[np.float64]:
-    """Largest value in every box of a range of rows and a range of columns; 0 in empty ones."""
-    bands = np.stack([values[a:b].max(axis=0, initial=0.0) for a, b in rows])
-    return np.stack([bands[:, a:b].max(axis=1, initial=0.0) for a, b in columns], axis=1)
+@njit(cache=True, nogil=True)
+def _local_maxima(values, y_blocks, x_blocks, n_blurs):
+    """Largest value that a row of blocks and a group abreast meet at the first blurs, 0 if none."""
+    n_y, n_x = y_blocks.start.size, x_blocks.start.size // _ABREAST
+    maxima = np.zeros((n_blurs, n_y, n_x))
+    band = np.empty(values.shape[1])
+    for blur in range(n_blurs):
+        for i in range(n_y):
+            top = y_blocks.first[i, blur]
+            band[:] = 0.0
+            for y in range(top, min(top + y_blocks.width[i, blur], values.shape[0])):
+                for x in range(band.size):
+                    band[x] = max(band[x], values[y, x])
+            for j in range(n_x):
+                for block in range(j * _ABREAST, (j + 1) * _ABREAST):
+                    left = x_blocks.first[block, blur]
+                    for x in range(left, min(left + x_blocks.width[block, blur], band.size)):
+                        maxima[blur, i, j] = max(maxima[blur, i, j], band[x])
+    return maxima
 
 
 class InterpolatedSearch:

@@ -277,14 +277,10 @@ def refined_table(
         row in `extrema`.
     """
     good = accepted(models, max_offset, max_iterations)
-    table = positions(good, sampling)
-    table["value"] = good["value"]
-    origin = extrema.iloc[good["keypoint"].to_numpy()].reset_index(drop=True)
-    for name in ("sign", "s", "row", "column", "difference"):
-        table[name] = origin[name]
-    table["models"] = good["model"]
-    table["keypoint"] = good["keypoint"]
-    return table
+    names = ["sign", "s", "row", "column", "difference"]
+    origin = extrema[names].iloc[good["keypoint"].to_numpy()].reset_index(drop=True)
+    counts = {"models": good["model"], "keypoint": good["keypoint"]}
+    return positions(good, sampling).assign(value=good["value"], **origin, **counts)
 
 
 def refined_keypoints(
