@@ -34,6 +34,7 @@ __all__ = [
     "Claim",
     "Judgement",
     "Quantity",
+    "cell",
     "evaluate",
     "judge",
     "judge_all",
@@ -758,7 +759,7 @@ def to_markdown(judgements: Sequence[Judgement]) -> str:
             if verdict != UNTESTED:
                 found = row["value"] + (f" ({row['interval']})" if row["interval"] else "")
                 cells += [row["paper"], f"`{row['criterion']}`", found]
-            lines.append("| " + " | ".join(_cell(text) for text in (*cells, row["note"])) + " |")
+            lines.append("| " + " | ".join(cell(text) for text in (*cells, row["note"])) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -767,8 +768,8 @@ def _place(row: Mapping[Any, Any]) -> str:
     return f"{row['where']}; {row['figure']}" if row["figure"] else str(row["where"])
 
 
-def _cell(text: str) -> str:
-    """Text that does not end a cell of a table."""
+def cell(text: str) -> str:
+    """Text that does not end a cell of a Markdown table."""
     return text.replace("|", "\\|")
 
 

@@ -51,11 +51,11 @@ def test_config_yaml_shows_every_default():
             assert given[key].keys() == value.keys(), key
 
 
-@pytest.mark.parametrize("path", ["quick.yaml", *(f"what_if/{p.name}" for p in sorted((ROOT / "config/what_if").glob("*.yaml")))])  # fmt: skip
+@pytest.mark.parametrize("path", ["quick.yaml", *(f"{p.parent.name}/{p.name}" for folder in ("what_if", "pictures") for p in sorted((ROOT / "config" / folder).glob("*.yaml")))])  # fmt: skip
 def test_overlays_are_valid_and_keep_to_their_own_folders(path):
     given = settings.read_yaml(ROOT / "config/config.yaml", ROOT / "config" / path)
     complete = settings.checked(given, SCHEMA)
-    name = path.removesuffix(".yaml")
+    name = path.removesuffix(".yaml").removeprefix("pictures/")
     for key in ("results", "figures", "logs"):
         assert complete[key] == f"{key}/{name}"
 

@@ -9,6 +9,10 @@ from pathlib import Path
 import pytest
 from project import ROOT
 
+from keystab.claims import FIELDS
+
+PICTURES = sorted((ROOT / "config/pictures").glob("*.yaml"))
+LEDGER = f"{','.join(FIELDS)}\none,,,,,,,,,reproduced,\n"
 RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
 FIGURES = [f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")] + ["floor"]
 
@@ -18,6 +22,7 @@ def test_whole_study_at_the_papers_settings(project):
     assert {*FIGURES, "all"} <= jobs.keys()
     assert (jobs["detect"], jobs["detect_stored"], jobs["scale_space"]) == (14, 3, 3)
     assert sum(jobs.values()) <= 200  # fat jobs
+    assert "claims" in jobs and "claims_pictures" not in jobs  # which needs several studies
 
 
 @pytest.mark.parametrize(
@@ -50,6 +55,33 @@ def test_any_sampling_can_be_stored_or_streamed(project, keep, stored):
 def test_what_ifs_can_be_planned(project, overlay):
     jobs = project.would_run("--configfile", f"config/what_if/{overlay.name}")
     assert jobs["fig6"] == 1
+
+
+@pytest.mark.parametrize("overlay", PICTURES, ids=lambda path: path.stem)
+def test_the_whole_study_fits_the_other_pictures(project, overlay):
+    jobs = project.would_run("--configfile", f"config/pictures/{overlay.name}")
+    assert {*FIGURES, "all", "claims"} <= jobs.keys()
+
+
+def test_pictures_are_compared_when_their_studies_are_made(project):
+    name = "results/claims_pictures.md"
+    status, said = project.dry_run("--", name)
+    assert status != 0
+    lines = [
+        f"results/{path.stem}/claims.csv is missing; make it first: "
+        f"make results/{path.stem}/claims.md WITH=config/pictures/{path.name}"
+        for path in PICTURES
+    ]
+    assert set(lines) < set(said.splitlines())
+    for folder in ("results", *(f"results/{path.stem}" for path in PICTURES)):
+        (project.folder / folder).mkdir(exist_ok=True)
+        (project.folder / folder / "claims.csv").write_text(LEDGER)
+    # In a run with results elsewhere, none of the three is made again.
+    (project.folder / "config/else.yaml").write_text("{results: results/else, logs: logs/else}\n")
+    target = "results/else/claims_pictures.md"
+    run = project.snakemake("--configfile", "config/else.yaml", "--", target)
+    assert run.returncode == 0, run.stdout
+    assert "0 of 1 verdicts depend on the picture." in (project.folder / target).read_text()
 
 
 @pytest.mark.parametrize("figure", FIGURES)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import yaml
 
-from keystab import feasibility, settings, view_sets
+from keystab import feasibility, ledgers, settings, view_sets
 from keystab.errors import InputError
 from keystab.fingerprint import fingerprint
 
@@ -127,3 +127,28 @@ def max_offset_of_path(_wildcards):
     refinement = config["refinement"]
     depends = refinement["move"] == "unit_step"
     return Named("refinement.max_offset", refinement["max_offset"] if depends else None)
+
+
+def sources_of_pictures():
+    """Ledgers of all pictures that are compared; stop where one comes from a run not yet made.
+
+    Each picture has settings of its own, and so a run of its own: no rule here can make the others.
+    """
+    try:
+        found = ledgers.sources("config/config.yaml", config["pictures"])
+    except InputError as problem:
+        sys.exit(str(problem))
+    problems = ledgers.missing(found, made=f"{RESULTS}/claims.csv")
+    if problems:
+        sys.exit("\n".join(problems))
+    return found
+
+
+def ledgers_of_pictures(_wildcards):
+    """Ledgers of all pictures."""
+    return [source.ledger for source in sources_of_pictures()]
+
+
+def names_of_pictures(_wildcards):
+    """Names of all pictures."""
+    return Named("pictures", [source.name for source in sources_of_pictures()])
