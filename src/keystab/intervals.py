@@ -209,6 +209,51 @@ def percentile_interval(
     return low, high
 
 
+def centred_interval(
+    samples: NDArray[np.float64],
+    estimate: NDArray[np.float64],
+    confidence: float = 0.95,
+    limits: tuple[float, float] = (-np.inf, np.inf),
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Percentile interval of bootstrap samples that are shifted onto the estimate.
+
+    For statistics that a draw with replacement shifts, because it holds fewer different items than
+    the data: the spread of the samples is used, and not where they lie.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n_resamples, ...)
+        A statistic of each resample; NaN where it does not exist.
+    estimate : ndarray, shape (...)
+        The statistic of the data, onto which the mean of the samples is shifted.
+    confidence : float
+        Between 0 and 1.
+    limits : tuple of float
+        Smallest and largest value that the statistic can have.
+
+    Returns
+    -------
+    low, high : ndarray, shape (...)
+        NaN where no sample exists.
+
+    Raises
+    ------
+    InputError
+        If `confidence` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> low, high = centred_interval(np.linspace(6, 8, 101), np.array(5.0))
+    >>> print(f"{low:.2f} {high:.2f}")
+    4.05 5.95
+    """
+    known = ~np.isnan(samples)
+    total = np.where(known, samples, 0.0).sum(axis=0)
+    mean = total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    low, high = percentile_interval(samples, confidence)
+    return np.clip(low - mean + estimate, *limits), np.clip(high - mean + estimate, *limits)
+
+
 def _require_confidence(confidence: float) -> None:
     if not 0 < confidence < 1:
         raise InputError(f"confidence is {confidence}, allowed is between 0 and 1: change it")

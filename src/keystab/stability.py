@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from keystab.duplicates import SCALE_RATIO, SPACE_TOLERANCE, matched
 from keystab.errors import InputError
-from keystab.intervals import BOTH, Purpose, percentile_interval, table_counts, wilson_interval
+from keystab.intervals import BOTH, Purpose, centred_interval, table_counts, wilson_interval
 from keystab.matching import gather, set_codes, set_names
 
 STABLE = 0.8
@@ -105,7 +105,7 @@ def stability_curve(
     resample : collection of {"keypoints", "sets"}
         What is drawn with replacement.
     confidence : float
-        Of the percentile interval.
+        Of the interval.
 
     Returns
     -------
@@ -121,9 +121,9 @@ def stability_curve(
 
     Notes
     -----
-    A resample of the sets holds some of them twice and about 37 % not at all, and so fewer
-    distinct ones than the data: keypoints seen only in the missing ones drop out, and the
-    interval lies somewhat high where few images suffice.
+    A resample of the sets holds some of them twice and about 37 % not at all: keypoints seen only
+    in the missing ones drop out, and the others are seen in all the sooner. The samples therefore
+    lie above the data; they are shifted back, see `keystab.intervals.centred_interval`.
 
     Examples
     --------
@@ -154,7 +154,9 @@ def stability_curve(
     if n_resamples:
         counts = table_counts(seen.shape, n_resamples, resample, "curve", *purpose)
         samples = _percentage(_seen_at_least(seen, *counts), needed)
-        curve["low"], curve["high"] = percentile_interval(samples, confidence)
+        estimate = curve["percentage_of_unique"].to_numpy()
+        interval = centred_interval(samples, estimate, confidence, limits=(0.0, 100.0))
+        curve["low"], curve["high"] = interval
     return curve
 
 

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from keystab.errors import InputError
-from keystab.intervals import bootstrap_counts, percentile_interval, table_counts, wilson_interval
+from keystab.intervals import (
+    bootstrap_counts,
+    centred_interval,
+    percentile_interval,
+    table_counts,
+    wilson_interval,
+)
 
 
 # Newcombe, Statistics in Medicine 17, 857-872 (1998), table I, method 3.
@@ -80,3 +86,18 @@ def test_percentile_interval_ignores_what_does_not_exist():
     low, high = percentile_interval(samples, 0.9)
     np.testing.assert_allclose([low[0], high[0]], [5, 95], atol=0.06)
     assert np.isnan([low[1], high[1]]).all()
+
+
+def test_centred_interval_keeps_the_spread_and_moves_the_mean():
+    samples = np.random.default_rng(2).normal(7.0, 2.0, (20000, 2))
+    low, high = centred_interval(samples, np.array([3.0, -1.0]))
+    np.testing.assert_allclose(low, [3 - 3.92, -1 - 3.92], atol=0.1)
+    np.testing.assert_allclose(high, [3 + 3.92, -1 + 3.92], atol=0.1)
+    low, high = centred_interval(samples, np.array([3.0, -1.0]), limits=(0.0, 5.0))
+    assert low.tolist() == [0.0, 0.0] and high[0] == 5.0
+
+
+def test_centred_interval_of_nothing_is_nothing():
+    samples = np.array([[1.0, np.nan], [2.0, np.nan]])
+    low, high = centred_interval(samples, np.array([1.5, np.nan]))
+    assert np.isfinite([low[0], high[0]]).all() and np.isnan([low[1], high[1]]).all()
