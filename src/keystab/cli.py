@@ -1,4 +1,4 @@
-"""The command `keystab`: simulate a view, detect keypoints, measure a blur, look into a file.
+"""The command `keystab`: simulate, detect, find true extrema, measure a blur, look into files.
 
 Bad input ends with status 2 and one line on standard error.
 """
@@ -11,12 +11,15 @@ import math
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from keystab import __version__
 from keystab.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["main"]
 
@@ -106,21 +109,8 @@ def simulate(args: argparse.Namespace) -> None:
 def detect(args: argparse.Namespace) -> None:
     """Detect the keypoints of a picture and write them as a table."""
     from keystab.detection import detect_keypoints
-    from keystab.pictures import read_picture
-    from keystab.tables import to_csv, write_table
 
-    _check_table(args.output)
-    image = read_picture(args.picture)
-    options = {name: getattr(args, name) for name in args.parameters}
-    start = time.monotonic()
-    keypoints = detect_keypoints(image, **options)
-    seconds = time.monotonic() - start
-    if args.output is None:
-        sys.stdout.write(to_csv(keypoints))
-    else:
-        write_table(keypoints, args.output)
-    found = f"{len(keypoints)} keypoint{'s' * (len(keypoints) != 1)}"
-    print(f"{args.picture}: {found} in {seconds:.1f} s", file=sys.stderr)
+    _tabulate(args, detect_keypoints, ("keypoint", "keypoints"))
 
 
 def blur(args: argparse.Namespace) -> None:
@@ -147,22 +137,30 @@ def blur(args: argparse.Namespace) -> None:
 
 def truth(args: argparse.Namespace) -> None:
     """Find the true extrema of a picture and write them as a table."""
+    from keystab.truth import true_extrema
+
+    _tabulate(args, true_extrema, ("extremum", "extrema"))
+
+
+def _tabulate(
+    args: argparse.Namespace, find: Callable[..., pd.DataFrame], nouns: tuple[str, str]
+) -> None:
+    """Write what a function finds in a picture; say how many they are and how long it took."""
     from keystab.pictures import read_picture
     from keystab.tables import to_csv, write_table
-    from keystab.truth import true_extrema
 
     _check_table(args.output)
     image = read_picture(args.picture)
     options = {name: getattr(args, name) for name in args.parameters}
     start = time.monotonic()
-    extrema = true_extrema(image, **options)
+    found = find(image, **options)
     seconds = time.monotonic() - start
     if args.output is None:
-        sys.stdout.write(to_csv(extrema))
+        sys.stdout.write(to_csv(found))
     else:
-        write_table(extrema, args.output)
-    found = f"{len(extrema)} {'extremum' if len(extrema) == 1 else 'extrema'}"
-    print(f"{args.picture}: {found} in {seconds:.1f} s", file=sys.stderr)
+        write_table(found, args.output)
+    noun = nouns[len(found) != 1]
+    print(f"{args.picture}: {len(found)} {noun} in {seconds:.1f} s", file=sys.stderr)
 
 
 def inspect(args: argparse.Namespace) -> None:
