@@ -21,6 +21,7 @@ include: "workflow/rules/scale_space.smk"  # a view -> a stored scale-space, whe
 include: "workflow/rules/detect.smk"  # a view or its scale-space -> extrema, with refinement traces
 include: "workflow/rules/truth.smk"  # a view -> what a detector should find, where it is asked for
 include: "workflow/rules/match.smk"  # extrema of many samplings -> tables
+include: "workflow/rules/predict.smk"  # matches and truth of several pictures -> tables
 include: "workflow/rules/compare.smk"  # extrema of many views -> tables
 include: "workflow/rules/floor.smk"  # views -> extrema in variants of the arithmetic -> tables
 include: "workflow/rules/theory.smk"  # settings -> tables of what needs no picture
@@ -49,10 +50,11 @@ include: "workflow/rules/figures.smk"  # tables -> figures
 #   floor why extrema come and go at any density                floor_*.csv
 #   truth detections against the true extrema                   truth_*.csv
 #   refinement what it keeps and loses of the true extrema      refinement_choices.csv
+#   predictors whether one detection shows that it is unstable  predictors_*.csv
 FIGURES = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6"]
 FIGURES += ["fig7", "fig8", "fig9", "fig10", "fig11", "fig12"]
 FIGURES += ["figS1", "figS2", "figS3", "figS4"]
-FIGURES += ["floor", "truth", "refinement"]
+FIGURES += ["floor", "truth", "refinement", "predictors"]
 
 
 rule all:

@@ -125,6 +125,58 @@ def setting_problems(settings: Settings) -> list[str]:
     return problems
 
 
+def further_pictures(settings: Settings, folder: Path | str = ".") -> list[str]:
+    """Names of the pictures of figure predictors that are not the reference.
+
+    Left out once, a picture that counts twice would have been learnt from.
+
+    Parameters
+    ----------
+    settings : dict
+        Complete settings.
+    folder : path
+        Folder that relative paths in the settings start from.
+
+    Examples
+    --------
+    >>> pictures = {"a": {"path": "a.png"}, "b": {"path": "./b.png"}}
+    >>> further_pictures({"reference": "b.png", "predictors": {"pictures": pictures}})
+    ['a']
+    """
+    own = Path(folder, settings["reference"]).resolve()
+    return [
+        name
+        for name, picture in settings["predictors"]["pictures"].items()
+        if Path(folder, picture["path"]).resolve() != own
+    ]
+
+
+def further_picture_problems(settings: Settings, folder: Path) -> list[str]:
+    """One line for every further picture of figure predictors that cannot be used."""
+    names = further_pictures(settings, folder)
+    if not names:
+        return [
+            "predictors.pictures has no picture besides the reference; figure predictors leaves "
+            "one out at a time: name one"
+        ]
+    least = math.ceil(2 * settings["comparison"]["border"]) + 3
+    problems = []
+    for name in names:
+        picture = settings["predictors"]["pictures"][name]
+        try:
+            shape = picture_shape(folder / picture["path"])
+        except InputError as error:
+            problems.append(f"predictors.pictures.{name}: {error}")
+            continue
+        height, width = (int(size / picture["step"]) for size in shape)
+        if min(height, width) < least:
+            problems.append(
+                f"predictors.pictures.{name}.step is {picture['step']:g}, which gives a view of "
+                f"{height} x {width} px, allowed are sides of at least {least} px: lower it"
+            )
+    return problems
+
+
 def _order(block: Settings, name: str, lower: str, upper: str) -> list[str]:
     if block[lower] < block[upper]:
         return []
@@ -160,7 +212,7 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
         line
         for name, views in settings["sets"].items()
         for line in fit_problems(name, views, shape, settings["comparison"]["border"])
-    ]
+    ] + further_picture_problems(settings, folder)
     if problems:
         return problems
     problems = [

@@ -94,7 +94,9 @@ def area_under_curve(stable: ArrayLike, unstable: ArrayLike, direction: int = 1)
     """
     good, bad = _sorted_groups(stable, unstable, direction)
     one = np.ones((1, 1), dtype=np.int64)
-    return float(_areas(good, bad, one.repeat(len(good), axis=1), one.repeat(len(bad), axis=1))[0])
+    return float(
+        weighted_areas(good, bad, one.repeat(len(good), axis=1), one.repeat(len(bad), axis=1))[0]
+    )
 
 
 def auc_interval(
@@ -137,7 +139,7 @@ def auc_interval(
     good, bad = _sorted_groups(stable, unstable, direction)
     if not len(good) or not len(bad):
         return float("nan"), float("nan")
-    areas = _areas(
+    areas = weighted_areas(
         good,
         bad,
         bootstrap_counts(len(good), n_resamples, "auc", "stable", *purpose),
@@ -260,17 +262,37 @@ def _sorted_groups(
     return good, bad
 
 
-def _areas(
+def weighted_areas(
     good: NDArray[np.float64],
     bad: NDArray[np.float64],
     good_counts: NDArray[np.int64],
     bad_counts: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Areas for many weightings of the sorted groups at once, counts of shape (n, group size).
+    """Areas for many weightings of the sorted groups at once.
 
+    Parameters
+    ----------
+    good, bad : ndarray
+        Both groups, ascending, turned so that larger values are expected of the good ones.
+    good_counts, bad_counts : ndarray of int, shapes (n, len(good)), (n, len(bad))
+        How often each counts, in every weighting.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        NaN where a group is empty or counts for nothing.
+
+    Notes
+    -----
     With C the running sum of the weights of `bad`, a member of `good` beats C(first place where
     it could be inserted) of them and ties with C(last) - C(first). All sums are whole numbers and
     hence exact.
+
+    Examples
+    --------
+    >>> good, bad, one = np.array([3.0, 4.0]), np.array([3.5]), np.array([[1], [1]])
+    >>> weighted_areas(good, bad, np.array([[1, 1], [0, 2]]), one)
+    array([0.5, 1. ])
     """
     if not len(good) or not len(bad):
         return np.full(len(good_counts), np.nan)
@@ -279,4 +301,5 @@ def _areas(
     beaten = running[:, np.searchsorted(bad, good, "left")]
     beaten = beaten + running[:, np.searchsorted(bad, good, "right")]
     total = good_counts.sum(axis=1) * bad_counts.sum(axis=1)
-    return (good_counts * beaten).sum(axis=1) / (2 * total)
+    won = (good_counts * beaten).sum(axis=1)
+    return np.divide(won, 2 * total, out=np.full(len(total), np.nan), where=total > 0)

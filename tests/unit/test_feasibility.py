@@ -65,6 +65,9 @@ def test_shipped_settings_are_feasible(path):
         ([("sets.zooms.zoom", 4.0), ("sets.zooms.n_oct", 2)], "sets.zooms leaves no common range of scales: the last view begins at 5.54 px of the first, which ends at 4.4 px"),
         ([("sets.translations.shift_spread", 300.0)], "sets.translations leaves no common field of view: no pixel of the first view of 259 x 434 px lies 17 px inside all 32 views"),
         ([("sets.translations.height", 260)], "sets.translations.height is 260, allowed is at most 259: the reference has 2250 px, the step is 10"),
+        ([("predictors.pictures.stream.step", 300.0)], "predictors.pictures.stream.step is 300, which gives a view of 6 x 10 px, allowed are sides of at least 9 px"),
+        ([("predictors.pictures.stream.path", "nowhere.png")], "predictors.pictures.stream: "),
+        ([("predictors.pictures", {"own": {"path": "config/images/../images/coldwarm.png", "step": 10}})], "predictors.pictures has no picture besides the reference"),
     ],
 )  # fmt: skip
 def test_contradictions_get_one_line(changes, line, monkeypatch):

@@ -16,12 +16,14 @@ from keystab.stages import (
     count_refined,
     cut_cubes,
     detect,
+    detect_samplings,
     detect_views,
     find_truth,
     match_samplings,
     scale_space,
     scale_spaces,
     score_features,
+    score_predictors,
     simulate,
 )
 from keystab.tables import read_table
@@ -245,6 +247,51 @@ def test_the_truth_is_that_of_the_stored_view(reference, tmp_path):
     found = read_table(out)
     assert len(found) > 3 and view.blur == 0.9
     assert found.equals(true_extrema(view.image, 0.9, 1.2, 2.4, 1.3))
+
+
+def test_samplings_at_once_are_those_one_by_one_and_single_detections_are_scored(
+    reference, tmp_path
+):
+    assert simulate.main(view_arguments(reference, tmp_path, step="3")) == 0
+    views = ["--views", str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]
+    at_once = [str(tmp_path / "all.parquet")]
+    given = [*views, "--n-spo", "3", "4", *DETECTOR, "--epsilon", "0.0", "--extrema", *at_once]
+    assert detect_samplings.main(given) == 0
+    assert detect.main(detect_arguments(tmp_path, "n4")) == 0
+    extrema, alone = read_table(tmp_path / "all.parquet"), read_table(tmp_path / "n4.parquet")
+    assert extrema[extrema["n_spo"] == 4].reset_index(drop=True).equals(alone)
+
+    same = [
+        "--space-tolerance",
+        "1.0",
+        "--scale-ratio",
+        "1.4142135623730951",
+        "--match-sign",
+        "False",
+    ]
+    compared = ["--border", "3.0", "--first-scale", "1.05", "--last-scale", "None"]
+    scales = ["--sigma-min", "1.1", "--kappa", "1.2599210498948732"]
+    labels = ["--stable-above", "0.8", "--unstable-below", "0.6"]
+    names = ("matches", "counts", "keypoints", "occurrence", "summary")
+    tables = [text for name in names for text in (f"--{name}", str(tmp_path / f"{name}.csv"))]
+    asked = ["--n-spo", "3", "4", *scales, *same, *compared, *labels]
+    assert match_samplings.main([*views, "--samplings", *at_once, *asked, *tables]) == 0
+    truth = str(tmp_path / "truth.parquet")
+    assert find_truth.main([*views, *scales, "--sigma-max", "2.4", "--table", truth]) == 0
+
+    picture = [*views[1::2], str(tmp_path / "keypoints.csv"), truth, *at_once]
+    pictures = ["--picture", "one", *picture, "--picture", "two", *picture]
+    split = ["--end", "2.0", "--block", "20.0", "--n-folds", "3", "--n-resamples", "100"]
+    names = ("detections", "auc", "gain", "roc")
+    tables = [text for name in names for text in (f"--{name}", str(tmp_path / f"{name}.csv"))]
+    assert score_predictors.main([*pictures, *asked, *split, *tables]) == 0
+    scored, auc = read_table(tmp_path / "detections.csv"), read_table(tmp_path / "auc.csv")
+    assert len(scored) > 10 and set(scored["n_spo"]) == {3, 4}
+    # The same picture twice: the same predictors, and the same areas of those that learn nothing.
+    areas = auc[auc["validation"] == "none"].pivot(
+        index=["label", "predictor"], columns="picture", values="auc"
+    )
+    assert areas["one"].equals(areas["two"]) and areas.loc["stability"].notna().all(axis=None)
 
 
 def test_a_picture_without_detail_has_no_keypoints_and_is_named_where_some_are_needed(

@@ -12,10 +12,12 @@ FIGURES = {f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")} | {
     "floor",
     "truth",
     "refinement",
+    "predictors",
 }
+PREDICTING = {"score_predictors", "predictors"}
 AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
-AFTER_MATCHING |= {"judge_keypoints", "truth"}
-SAMPLINGS = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
+AFTER_MATCHING |= {"judge_keypoints", "truth"} | PREDICTING
+SAMPLINGS = {"match_grid", "match_samplings", "match_picture", "fig3"} | AFTER_MATCHING
 VIEWS = {"match_views", "match_shipped", "fig7", "fig8", "figS1"}
 SWEEPS = {"match_sweep", "match_blurs", "fig10", "fig11", "fig12", "figS2"}
 KAPPAS = {"match_kappas", "fig9"}
@@ -24,15 +26,19 @@ VARIANTS = {"match_variants", "floor"}
 MATCHING = SAMPLINGS | VIEWS | SWEEPS | KAPPAS | VARIANTS
 ACCEPTING = {"judge_samplings", "judge_cosine", "judge_kappas", "judge_views", "truth"}
 JUDGING = ACCEPTING | {"judge_grid", "judge_keypoints", "judge_refinement", "refinement"}
-TRUTHS = {"find_truth", "find_truth_of_kappa", "find_scene"}
+JUDGING |= PREDICTING
+TRUTHS = {"find_truth", "find_truth_of_kappa", "find_scene", "find_truth_of_picture"}
+# What is done with further pictures, and does not depend on the view of the reference.
+OF_PICTURES = {"detect_picture", "match_picture", "find_truth_of_picture"}
 ONE_VIEW = {"detect", "detect_stored", "detect_grid", "count_refined"} | SAMPLINGS
 DETECTION = ONE_VIEW | {"detect_views", "detect_kappas", "detect_variant"} | MATCHING | JUDGING
-DETECTION |= {"detect_cosine"}
+DETECTION |= {"detect_cosine", "detect_picture"}
 STILL = (
     {"simulate", "scale_space", "detect_kappas", "detect_variant"} | ONE_VIEW | KAPPAS | VARIANTS
 )
-STILL |= TRUTHS | JUDGING | {"detect_cosine"}
-SIMULATION = STILL | DETECTION | {"describe_views", "crop_views", "fig2"}
+STILL = (STILL | TRUTHS | JUDGING | {"detect_cosine"}) - OF_PICTURES
+SIMULATION = STILL | DETECTION | TRUTHS | {"describe_views", "crop_views", "fig2"}
+SIMULATION |= {"simulate_picture"}
 THEORY = {"semigroup", "noise_theory", "camera_optics"} | BLOBS
 EVERYTHING = SIMULATION | FIGURES | THEORY
 
@@ -88,14 +94,16 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
     ("setting", "expected"),
     [
         ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS | BLOBS | ACCEPTING),
-        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "judge_grid", "detect_variant"} - VARIANTS),
+        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "judge_grid", "detect_variant"} - VARIANTS - OF_PICTURES),
         ("comparison: {match_sign: true}", MATCHING),
         ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS | SWEEPS | VARIANTS),
         ("comparison: {scale_ratio: 1.5}", MATCHING | JUDGING),
         ("stability: {seen_by: 0.6}", {"match_sweep", "fig10", "fig11", "fig12"}),
         ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "judge_views", "truth"}),
         ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
-        ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
+        ("comparison: {stable_above: 0.9}", {"match_samplings", "match_picture"} | AFTER_MATCHING),
+        ("predictors: {block: 25.0}", PREDICTING),
+        ("predictors: {pictures: {stream: {step: 22}}}", OF_PICTURES | PREDICTING | {"simulate_picture"}),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
         ("optics: {defocus: 20.0}", {"camera_optics", "figS3"}),
         ("blobs: {camera_blur: 0.7}", BLOBS),

@@ -14,7 +14,7 @@ from keystab.claims import FIELDS
 PICTURES = sorted((ROOT / "config/pictures").glob("*.yaml"))
 LEDGER = f"{','.join(FIELDS)}\none,,,,,,,,,reproduced,\n"
 RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
-FIGURES = [f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")] + ["floor"]
+FIGURES = [f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")] + ["floor", "predictors"]
 
 
 def test_whole_study_at_the_papers_settings(project):
@@ -38,6 +38,7 @@ def test_whole_study_at_the_papers_settings(project):
         ("figures/quick/fig7.pdf", {"simulate", "detect_views", "match_views", "match_shipped", "fig7"}),
         ("figures/quick/fig9.pdf", {"simulate", "detect_kappas", "match_kappas", "fig9"}),
         ("figures/quick/figS1.png", {"simulate", "detect_views", "match_views", "figS1"}),
+        ("figures/quick/predictors.pdf", {"simulate", "scale_space", "detect_stored", "detect", "match_samplings", "find_truth", "simulate_picture", "detect_picture", "match_picture", "find_truth_of_picture", "score_predictors", "predictors"}),
     ],
 )  # fmt: skip
 def test_figures_need_only_what_they_show(project, target, rules):
@@ -82,6 +83,15 @@ def test_pictures_are_compared_when_their_studies_are_made(project):
     run = project.snakemake("--configfile", "config/else.yaml", "--", target)
     assert run.returncode == 0, run.stdout
     assert "0 of 1 verdicts depend on the picture." in (project.folder / target).read_text()
+
+
+def test_a_picture_that_is_the_reference_is_not_seen_twice(project):
+    (project.folder / "own.yaml").write_text(
+        "reference: config/images/stream.png\nreference_sha256: null\n"
+    )
+    target = ("--configfile", "config/quick.yaml", "own.yaml", "--", "figures/quick/predictors.pdf")
+    code, said = project.dry_run(*target)
+    assert code == 0 and "picture 'coldwarm'" in said and "picture 'stream'" not in said
 
 
 @pytest.mark.parametrize("figure", FIGURES)

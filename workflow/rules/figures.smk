@@ -388,3 +388,25 @@ use rule fig1 as refinement with:
         module="keystab.figures.refinement",
         code=fingerprint("keystab.figures.refinement"),
         software=SOFTWARE,
+
+
+use rule fig1 as predictors with:
+    input:
+        f"{RESULTS}/tables/predictors_auc.csv",
+        f"{RESULTS}/tables/predictors_gain.csv",
+        f"{RESULTS}/tables/predictors_roc.csv",
+    output:
+        pdf=f"{DRAWN}/predictors.pdf",
+        png=report(
+            f"{DRAWN}/predictors.png", caption="../report/predictors.rst", category="Figures"
+        ),
+    log:
+        f"{LOGS}/predictors.log",
+    benchmark:
+        f"{LOGS}/benchmarks/predictors.tsv"
+    params:
+        tables=folder_of_inputs,
+        draft=DRAFT,
+        module="keystab.figures.predictors",
+        code=fingerprint("keystab.figures.predictors"),
+        software=SOFTWARE,

@@ -281,3 +281,50 @@ def guards_of_judged_sets(_wildcards):
 def kappa_of_file(wildcards):
     """Ratio of the two blurs that a file of true extrema belongs to."""
     return Named("kappa", 2 ** (1 / float(wildcards.fraction)))
+
+
+# Figure predictors: further pictures, and the samplings whose detections it scores.
+PICTURES = feasibility.further_pictures(config)
+PREDICTED_N_SPO = [
+    n_spo for n_spo in config["predictors"]["n_spo"] if n_spo in config["samplings"]["n_spo"]
+] or sorted({config["samplings"]["n_spo"][0], config["samplings"]["n_spo"][-1]})
+
+
+def path_of_picture(wildcards):
+    """File of a further picture."""
+    return config["predictors"]["pictures"][wildcards.set]["path"]
+
+
+def name_of_reference():
+    """What figure predictors calls the reference: its name among the pictures, or its file's."""
+    others = config["predictors"]["pictures"]
+    known = [name for name in others if name not in PICTURES]
+    own = Path(config["reference"]).stem
+    return known[0] if known else own if own not in others else "reference"
+
+
+def files_of_pictures():
+    """What figure predictors needs of the reference and of each further picture, by kind."""
+    folders = [f"{RESULTS}/pictures/{name}" for name in PICTURES]
+    return {
+        "views": [ancient(f) for f in [f"{RESULTS}/views/still", *(f"{f}/view" for f in folders)]],
+        "digests": [f"{RESULTS}/views/still.sha256", *(f"{f}/view.sha256" for f in folders)],
+        "keypoints": [
+            f"{RESULTS}/tables/fig4_keypoints.csv",
+            *(f"{f}/keypoints.csv" for f in folders),
+        ],
+        "truth": [f"{RESULTS}/truth/view.parquet", *(f"{f}/truth.parquet" for f in folders)],
+        "samplings": [f"{RESULTS}/keypoints/sampling_n{n}.parquet" for n in PREDICTED_N_SPO],
+        "extrema": [f"{f}/samplings.parquet" for f in folders],
+    }
+
+
+def options_of_pictures(_wildcards, input):
+    """Options of the stage that scores predictors: the name and the files of every picture."""
+    kinds = ("views", "digests", "keypoints", "truth")
+    options = []
+    for k, name in enumerate([name_of_reference(), *PICTURES]):
+        own = input.samplings if k == 0 else [input.extrema[k - 1]]
+        files = [input[kind][k] for kind in kinds]
+        options.append(shlex.join(["--picture", name, *map(str, [*files, *own])]))
+    return " ".join(options)

@@ -75,6 +75,12 @@ CAUSE_COLOURS = {
 }
 """What a keypoint is, from right to wrong (figure truth)."""
 
+PICTURE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#A8458A", "#8a6d00")
+"""Pictures, in their order; the first one is the study's (figure predictors)."""
+
+MODEL_COLOURS = {"best": GREY, "combined": INK, "combined_end": "#D55E00"}
+"""The best single predictor, and models of several (figure predictors)."""
+
 COMPARED_COLOURS = {"found": CHANGE_COLOURS["lost"], "right": CHANGE_COLOURS["new"]}
 """Shares of keypoints that are not lost, and that are not new (figure S2)."""
 

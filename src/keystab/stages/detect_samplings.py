@@ -1,0 +1,51 @@
+"""Detect the extrema of one view at all balanced samplings, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from keystab.stages import _run
+
+
+@_run.stage
+def main(argv: Sequence[str] | None = None) -> None:
+    """Read the view; write one table of the extrema of all samplings."""
+    parser = _run.parser(__doc__)
+    _run.views_arguments(parser)
+    _run.required(parser, "n-spo", "scales per octave of the samplings", type=int, nargs="+")
+    _run.detector_arguments(parser)
+    _run.required(parser, "epsilon", "least difference to the 26 neighbours", type=float)
+    _run.required(parser, "extrema", "table to write", type=Path)
+    args = parser.parse_args(argv)
+
+    import pandas as pd
+
+    from keystab.detection import extrema_table
+    from keystab.dog_space import scale_space
+    from keystab.extrema import discrete_extrema
+    from keystab.progress import progress
+    from keystab.stages._inputs import read_view
+    from keystab.tables import write_table
+
+    view = read_view(args.views, args.views_digest)
+    tables = []
+    for n_spo in progress(args.n_spo, len(args.n_spo), "samplings"):
+        space = scale_space(
+            view.image,
+            view.blur,
+            n_spo=n_spo,
+            sigma_min=args.sigma_min,
+            kappa=args.kappa,
+            oversampling=args.oversampling,
+        )
+        extrema = extrema_table(space, discrete_extrema(space, args.epsilon))
+        extrema.insert(0, "n_spo", n_spo)
+        extrema.insert(1, "delta_min", space.sampling.delta_min)
+        tables.append(extrema)
+    write_table(pd.concat(tables, ignore_index=True), args.extrema)
+    print(f"{sum(map(len, tables))} extrema in {len(tables)} samplings")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
