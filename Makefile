@@ -4,6 +4,8 @@
 SHELL := /bin/bash
 CORES ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
 WITH ?=
+ARCHIVE ?=
+RECOMPUTE ?=
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 SNAKEMAKE = python tools/study.py --cores $(CORES)
@@ -11,7 +13,7 @@ OVERLAY = $(if $(WITH),--configfile $(WITH))
 QUICK = --configfile config/quick.yaml
 
 .DEFAULT_GOAL := help
-.PHONY: help study quick test bench check check-workflow format lock why clean environment FORCE
+.PHONY: help study quick archive verify reference test bench check check-workflow format lock why clean environment FORCE
 
 help: ## List the targets
 	@echo "make study                  the whole study"
@@ -37,6 +39,15 @@ why: environment ## What would run, and why (TARGET=figures/fig5.pdf: for one fi
 
 test: environment ## All tests
 	pytest -n 2
+
+archive: environment ## Pack the finished study into one file, results/archive/keystab-VERSION.zip
+	keystab archive $(OVERLAY)
+
+verify: environment ## Check the results here, or ARCHIVE=FILE (RECOMPUTE=fig5, or all: compute again)
+	@keystab verify $(ARCHIVE) --cores $(CORES) $(OVERLAY) $(if $(RECOMPUTE),--recompute $(RECOMPUTE))
+
+reference: environment ## Copy tables, claims and PNG figures to results/reference, to be committed
+	keystab reference $(OVERLAY)
 
 bench: environment ## Compare speed and memory with other detectors
 	python -m benchmarks

@@ -1,6 +1,7 @@
 """The command `keystab`: simulate, detect, find true extrema, measure a blur, look into files.
 
-Bad input ends with status 2 and one line on standard error.
+Of the study it says where a figure comes from, packs a finished run and verifies one. Bad input
+ends with status 2 and one line on standard error.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -44,11 +46,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0, 2 for input that cannot be worked with, 130 when interrupted.
+        Exit status: 0, 1 where a verification found something, 2 for input that cannot be worked
+        with, 130 when interrupted.
     """
     args = _parser().parse_args(argv)
+    status = None
     try:
-        args.run(args)
+        status = args.run(args)
         sys.stdout.flush()
     except InputError as error:
         return _refuse(args, str(error))
@@ -60,7 +64,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _refuse(args, f"{error.filename or 'output'}: {error.strerror or error}")
     except KeyboardInterrupt:
         return 130
-    return 0
+    return status or 0
 
 
 def _refuse(args: argparse.Namespace, message: str) -> int:
@@ -170,6 +174,71 @@ def inspect(args: argparse.Namespace) -> None:
     print(describe(args.path))
 
 
+def whence(args: argparse.Namespace) -> None:
+    """Say where a figure comes from."""
+    from keystab.provenance import whence as of
+    from keystab.workflow import find_project
+
+    print(of(args.figure, find_project()))
+
+
+def archive(args: argparse.Namespace) -> None:
+    """Pack a finished run into one file."""
+    from keystab.archive import pack
+    from keystab.memory import in_words
+    from keystab.provenance import file_digest
+    from keystab.workflow import Study, find_project
+
+    path = pack(Study(find_project(), args.configfile))
+    print(f"{path}: {in_words(path.stat().st_size)}, sha256 {file_digest(path)}")
+
+
+def reference(args: argparse.Namespace) -> None:
+    """Copy the small results of a finished run to where they can be committed."""
+    from keystab.archive import publish
+    from keystab.memory import in_words
+    from keystab.workflow import Study, find_project
+
+    folder = publish(Study(find_project(), args.configfile))
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
+    print(f"{folder}: {len(sizes)} files, {in_words(sum(sizes))}")
+
+
+def verify(args: argparse.Namespace) -> int:
+    """Check an archive, or the results that are here; recompute figures on request."""
+    from keystab import verification
+    from keystab.provenance import file_digest
+    from keystab.workflow import Study, find_project
+
+    project = find_project()
+    start = time.monotonic()
+    if args.archive is None:
+        print(f"results of {project}")
+        checks, sound = verification.check_here(Study(project, args.configfile))
+    else:
+        verification.require_archive(args.archive)
+        print(f"{args.archive}: sha256 {file_digest(args.archive)}")
+        checks, sound = verification.check_archive(args.archive, project)
+    print(verification.report(checks), flush=True)
+    if args.recompute:
+        with _run_to_compare(args.archive, project) as source:
+            checks, same = verification.recompute(
+                source, project, args.recompute, args.cores, args.rtol, args.atol
+            )
+        print(f"recomputed {' '.join(args.recompute)}\n{verification.report(checks)}")
+        sound = sound and same
+    verdict = "verified" if sound else "NOT verified: see the lines marked FAILED"
+    print(f"{verdict} ({time.monotonic() - start:.0f} s)")
+    return 0 if sound else 1
+
+
+def _run_to_compare(path: Path | None, project: Path) -> AbstractContextManager[Path]:
+    """Folder of the run that is recomputed: that of an archive, or the committed reference."""
+    from keystab.verification import unpacked
+
+    return unpacked(path) if path else nullcontext(project / "results/reference")
+
+
 def _check_table(path: Path | None) -> None:
     """Refuse a table that cannot be written before anything is computed."""
     from keystab.files import check_writable
@@ -233,7 +302,64 @@ def _parser() -> argparse.ArgumentParser:
     )
     to.add_argument("path", metavar="PATH", type=Path, help="store, .csv or .parquet table")
     to.set_defaults(run=inspect)
+    _study_commands(commands)
     return parser
+
+
+def _study_commands(commands: argparse._SubParsersAction[_Parser]) -> None:
+    """Add the commands that are about the study; they are given in the project's folder."""
+    to = commands.add_parser(
+        "whence",
+        help="say where a figure of the study comes from",
+        description="Say what drew a figure, from which tables, what these were made from, and how "
+        "to make it again; and whether files and code are still the same here.",
+    )
+    to.add_argument("figure", metavar="FIGURE", type=Path, help="figure of the study, PDF or PNG")
+    to.set_defaults(run=whence)
+    to = commands.add_parser(
+        "archive",
+        help="pack a finished run of the study into one file",
+        description="Write {results}/archive/keystab-VERSION.zip: figures, tables, verdicts, code, "
+        "settings, environment.lock, Snakemake's records, costs and an RO-Crate.",
+    )
+    _configfile_argument(to)
+    to.set_defaults(run=archive)
+    to = commands.add_parser(
+        "reference",
+        help="copy the small results of a finished run to results/reference",
+        description="Copy tables, verdicts and PNG figures, with their digests and what they were "
+        "made by, to results/reference, to be committed.",
+    )
+    _configfile_argument(to)
+    to.set_defaults(run=reference)
+    to = commands.add_parser(
+        "verify",
+        help="check an archive of the study, or the results that are here",
+        description="Check an archive against the code, settings and lock file here, without "
+        "computing anything; without an archive, the results that are here, and compare them with "
+        "results/reference. With --recompute, compute figures again and compare all numbers.",
+    )
+    to.add_argument("archive", metavar="ARCHIVE", type=Path, nargs="?", help="zip file to check")
+    _configfile_argument(to)
+    to.add_argument(
+        "--recompute", nargs="+", metavar="FIGURE",
+        help="figures to compute again, such as fig5, or all; needs the time and disk of the study",
+    )  # fmt: skip
+    to.add_argument("--cores", type=int, default=1, metavar="N", help="jobs at a time (default 1)")
+    for name, value, what in (("rtol", 1e-6, "relative"), ("atol", 1e-9, "absolute")):
+        to.add_argument(
+            f"--{name}", type=float, default=value, metavar="T",
+            help=f"{what} tolerance for numbers where software or processor differ "
+            f"(default {value:g}); where both are the same, every bit counts",
+        )  # fmt: skip
+    to.set_defaults(run=verify)
+
+
+def _configfile_argument(to: argparse.ArgumentParser) -> None:
+    to.add_argument(
+        "--configfile", nargs="+", default=[], metavar="FILE",
+        help="settings of the run, laid over config/config.yaml as for snakemake",
+    )  # fmt: skip
 
 
 def _simulate_arguments(to: argparse.ArgumentParser) -> None:

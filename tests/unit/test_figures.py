@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from keystab import __version__
 from keystab.errors import InputError
 from keystab.figures import style
 from keystab.figures._render import check_tables, main, read_tables, save
+from keystab.passports import PNG_KEY, Passport, digests_of
 from keystab.tables import write_table
 
 NUMBERS = (*range(1, 13), "S1", "S2", "S3", "S4")
@@ -57,12 +59,14 @@ def test_drawing_twice_writes_the_same_pdf(n, modules, tables, drawn, tmp_path):
 
 def test_the_command_writes_what_the_library_writes(drawn, folder, tmp_path):
     flags = [f"--tables={folder(2)}", f"--pdf={tmp_path}/new/a.pdf"]
+    paths = [tmp_path / name for name in figure_tables.module(2).TABLES]
     done = subprocess.run(
         [sys.executable, "-m", "keystab.figures.fig2", *flags], capture_output=True, text=True
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["a.pdf"]
-    save(drawn[2], tmp_path / "b.pdf")
+    passport = Passport("a", __version__, None, None, {"draft": "False"}, digests_of(paths))
+    save(drawn[2], tmp_path / "b.pdf", passport=passport)
     assert (tmp_path / "new" / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
 
 
@@ -136,7 +140,7 @@ def test_the_command_marks_drafts_and_stamps_no_date(folder, capsys, modules, tm
     with Image.open(tmp_path / "final.png") as final, Image.open(tmp_path / "draft.png") as draft:
         assert final.width == draft.width == 300 * style.WIDTH
         assert final.height < draft.height
-        assert set(final.info) <= {"dpi"}
+        assert set(final.info) <= {"dpi", PNG_KEY}
 
 
 @pytest.mark.parametrize("n", NUMBERS)

@@ -98,6 +98,42 @@ class Project:
         path.write_text(text.replace(old, new, 1))
 
 
+def forked(
+    command: list[str], cwd: Path, env: dict[str, str], **_options: object
+) -> subprocess.CompletedProcess[str]:
+    """What `subprocess.run` does, for Snakemake: in a fork of this process, which has it loaded."""
+    import snakemake.cli
+
+    assert command[:3] == [sys.executable, "-m", "snakemake"]
+    with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
+        process = os.fork()
+        if process == 0:
+            status = 1
+            try:
+                os.dup2(output.fileno(), 1)
+                os.dup2(errors.fileno(), 2)
+                sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
+                sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
+                os.chdir(cwd)
+                os.environ.update(env)
+                snakemake.cli.main(command[3:])
+                status = 0
+            except SystemExit as end:
+                status = end.code if isinstance(end.code, int) else int(end.code is not None)
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                sys.stdout.flush()
+                sys.stderr.flush()
+                os._exit(status)
+        _, ended = os.waitpid(process, 0)
+        said = []
+        for file in (output, errors):
+            file.seek(0)
+            said.append(file.read())
+        return subprocess.CompletedProcess(command, os.waitstatus_to_exitcode(ended), *said)
+
+
 def copy_of_project(folder: Path, own_library: bool = True) -> Project:
     for part in PARTS:
         source = ROOT / part

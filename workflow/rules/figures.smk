@@ -33,6 +33,8 @@ rule fig1:
             --pdf {output.pdf:q} \
             --png {output.png:q} \
             {params.draft} \
+            --code {params.code} \
+            --lock {params.software} \
             >{log:q} 2>&1
         """
 

@@ -1,0 +1,221 @@
+"""What a figure says about itself: no time, nothing of others, and nothing that was changed."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+from pypdf import PdfReader, PdfWriter
+
+from keystab import __version__, cli, fingerprint
+from keystab.errors import InputError
+from keystab.figures._render import main, save
+from keystab.passports import PNG_KEY, Passport, digests_of
+from keystab.provenance import read_passport
+from keystab.tables import write_table
+
+DIGEST = st.text("0123456789abcdef", min_size=64, max_size=64)
+SIMPLE = st.text(st.characters(codec="utf-8"), max_size=8)
+PASSPORT = Passport(
+    "fig5",
+    "0.1.0",
+    64 * "a",
+    64 * "b",
+    {"draft": "False"},
+    {"one.csv": 64 * "1", "two.csv": 64 * "2"},
+)
+
+
+def drawing() -> Figure:
+    figure = Figure((1, 1))
+    figure.subplots().plot([0, 1])
+    return figure
+
+
+@pytest.fixture(params=["pdf", "png"])
+def figure(request, tmp_path):
+    path = tmp_path / f"fig5.{request.param}"
+    save(drawing(), path, passport=PASSPORT)
+    return path
+
+
+@settings(max_examples=30)
+@given(
+    st.builds(
+        Passport, SIMPLE, SIMPLE, st.none() | DIGEST, st.none() | DIGEST,
+        st.dictionaries(SIMPLE, SIMPLE, max_size=3), st.dictionaries(SIMPLE, DIGEST, max_size=3),
+    )
+)  # fmt: skip
+def test_a_passport_is_read_as_it_was_written(passport):
+    text = passport.to_text()
+    assert text.isascii() and "\n" not in text
+    assert Passport.from_text(text) == passport
+
+
+def test_config_changes_with_tables_and_own_settings_and_nothing_else():
+    config = PASSPORT.config
+    for changes in ({"code": 64 * "c"}, {"lock": None}, {"version": "2"}, {"figure": "fig6"}):
+        assert dataclasses.replace(PASSPORT, **changes).config == config
+    turned = dict(reversed(PASSPORT.tables.items()))
+    assert dataclasses.replace(PASSPORT, tables=turned).to_text() == PASSPORT.to_text()
+    for changes in (
+        {"settings": {"draft": "True"}},
+        {"tables": PASSPORT.tables | {"one.csv": 64 * "3"}},
+    ):
+        assert dataclasses.replace(PASSPORT, **changes).config != config
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("1111", "1112"),
+        ('"False"', '"True"'),
+        ("aaaa", "aaax"),
+        ('"draft"', '"more"'),
+        ("{", "["),
+        ('"fig5"', ""),
+    ],
+)
+def test_a_changed_passport_is_refused(old, new):
+    text = PASSPORT.to_text()
+    assert old in text
+    with pytest.raises(InputError, match="no passport of keystab|changed by hand or damaged"):
+        Passport.from_text(text.replace(old, new, 1))
+
+
+def test_figures_carry_their_passport_and_no_time(figure):
+    assert read_passport(figure) == PASSPORT
+    before = figure.read_bytes()
+    assert b"/CreationDate" not in before and b"tIME" not in before and b"/ModDate" not in before
+    save(drawing(), figure, passport=PASSPORT)
+    assert figure.read_bytes() == before
+    other = dataclasses.replace(PASSPORT, tables={"one.csv": 64 * "3"})
+    save(drawing(), figure, passport=other)
+    assert figure.read_bytes() != before and read_passport(figure) == other
+
+
+def test_figures_that_other_programs_saved_again_keep_it(figure):
+    if figure.suffix == ".pdf":
+        writer = PdfWriter(clone_from=PdfReader(figure))
+        writer.compress_identical_objects()
+        writer.write(figure)
+    else:
+        with Image.open(figure) as picture:
+            info = PngInfo()
+            info.add_itxt(PNG_KEY, picture.info[PNG_KEY], zip=True)
+            picture.convert("L").save(figure, pnginfo=info)
+    assert read_passport(figure) == PASSPORT
+
+
+def foreign_pdf() -> bytes:
+    data = io.BytesIO()
+    writer = PdfWriter()
+    writer.add_blank_page(9, 9)
+    writer.add_metadata({"/Keywords": "cats, dogs"})
+    writer.write(data)
+    return data.getvalue()
+
+
+def foreign_png() -> bytes:
+    data = io.BytesIO()
+    Image.fromarray(np.eye(5) > 0).save(data, "png")
+    return data.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (foreign_png(), "has no passport"),
+        (foreign_pdf(), "no passport of keystab"),
+        (foreign_png()[:40], "a damaged PNG"),
+        (b"%PDF-1.4\n", "a damaged PDF"),
+        (foreign_pdf()[:300], "a damaged PDF"),
+        (b"%PDF-1.4\nxref\n0 3\n0000000000 65535 f\ntrailer <</Size 3>>\nstartxref\n9\n%%EOF", "has no passport|a damaged PDF"),
+        (b"n_spo,found\n", "neither a PDF nor a PNG"),
+        (b"", "neither a PDF nor a PNG"),
+    ],
+)  # fmt: skip
+def test_what_has_no_passport_gives_one_line(data, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ("Snakefile", "environment.lock"):
+        (tmp_path / name).touch()
+    (tmp_path / "thing.pdf").write_bytes(data)
+    with pytest.raises(InputError, match=f"thing.pdf: .*({said})"):
+        read_passport(tmp_path / "thing.pdf")
+    assert cli.main(["whence", "thing.pdf"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("keystab whence: thing.pdf: ") and error.count("\n") == 1
+
+
+def test_missing_figures_folders_and_projects_give_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["whence", "fig5.pdf"]) == 2
+    assert "lies in no copy of the project" in capsys.readouterr().err
+    for path, said in ((tmp_path / "fig5.pdf", "no such file"), (tmp_path, "is a folder")):
+        with pytest.raises(InputError, match=said):
+            read_passport(path)
+
+
+def test_the_command_of_a_figure_writes_what_it_was_told_and_what_it_read(tmp_path):
+    write_table(pd.DataFrame({"x": [1.0]}), tmp_path / "one.csv")
+    flags = [
+        "--tables",
+        str(tmp_path),
+        "--pdf",
+        f"{tmp_path}/fig0.pdf",
+        "--png",
+        f"{tmp_path}/fig0.png",
+    ]
+    needs = {"one.csv": ("x",)}
+    assert (
+        main(
+            lambda tables, draft: drawing(), needs, [*flags, "--code", 64 * "a", "--lock", 64 * "b"]
+        )
+        == 0
+    )
+    expected = Passport(
+        "fig0",
+        __version__,
+        64 * "a",
+        64 * "b",
+        {"draft": "False"},
+        digests_of([tmp_path / "one.csv"]),
+    )
+    assert [read_passport(tmp_path / f"fig0.{kind}") for kind in ("pdf", "png")] == 2 * [expected]
+    assert main(lambda tables, draft: drawing(), needs, [*flags, "--draft"]) == 0
+    by_hand = dataclasses.replace(expected, code=None, lock=None, settings={"draft": "True"})
+    assert read_passport(tmp_path / "fig0.pdf") == by_hand
+
+
+def test_nothing_but_the_command_imports_the_rooms_that_come_last():
+    last = {
+        f"keystab.{name}"
+        for name in (
+            "archive",
+            "crate",
+            "differences",
+            "provenance",
+            "records",
+            "verification",
+            "workflow",
+        )
+    }
+    folder = fingerprint.PACKAGE_FOLDER
+    modules = {
+        ".".join(path.relative_to(folder.parent).with_suffix("").parts)
+        for path in folder.rglob("*.py")
+    }
+    modules = (
+        {name.removesuffix(".__init__") for name in modules} - last - {"keystab", "keystab.cli"}
+    )
+    assert last.isdisjoint({"keystab.passports"} | modules) and len(modules) > 100
+    for module in modules:
+        assert last.isdisjoint(fingerprint.imported_modules(module)), module

@@ -1,0 +1,401 @@
+"""A finished run can be packed, and whoever gets it sees in seconds what is wrong with it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import zipfile
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import small_study
+from project import forked
+
+from keystab import archive, cli, provenance, verification
+from keystab.errors import InputError
+from keystab.fingerprint import fingerprint
+from keystab.workflow import Study
+
+CODE = fingerprint("keystab.figures.fig1")
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch):
+    """Run Snakemake in forks of this process, which spares its import every time."""
+    monkeypatch.setattr("keystab.workflow.subprocess", SimpleNamespace(run=forked))
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory) -> Study:
+    """A small study that has been run."""
+    study = small_study.write(tmp_path_factory.mktemp("small") / "study", CODE)
+    study.run(1)
+    return study
+
+
+@pytest.fixture(scope="module")
+def packed(ran) -> Path:
+    return archive.pack(ran)
+
+
+@pytest.fixture
+def clone(ran, tmp_path) -> Path:
+    """A copy of the small study without results."""
+    return small_study.write(tmp_path / "clone", CODE).project
+
+
+@pytest.fixture
+def here(ran, tmp_path) -> Study:
+    """A copy of the small study with its results."""
+    shutil.copytree(ran.project, tmp_path / "here")
+    return Study(tmp_path / "here")
+
+
+def rewritten(packed: Path, target: Path, changes: dict[str, bytes | None], forge: bool) -> Path:
+    """Copy an archive with other bytes in some members, and its digests adapted or not."""
+    with zipfile.ZipFile(packed) as file:
+        members = {name: file.read(name) for name in file.namelist()}
+    members = {name: data for name, data in (members | changes).items() if data is not None}
+    if forge:
+        sums = {name: hashlib.sha256(data).hexdigest() for name, data in members.items()}
+        del sums[archive.SUMS]
+        lines = [f"{digest}  {name}\n" for name, digest in sums.items()]
+        members[archive.SUMS] = "".join(lines).encode()
+    with zipfile.ZipFile(target, "w") as file:
+        for name, data in members.items():
+            file.writestr(name, data)
+    return target
+
+
+def found(path: Path, project: Path) -> dict[str, list[str]]:
+    """Problems of an archive by the name of the check."""
+    checks, sound = verification.check_archive(path, project)
+    problems = {check.what: check.problems for check in checks if check.problems}
+    assert sound == (not problems)
+    return problems
+
+
+def test_an_archive_is_verified_without_its_intermediate_files(packed, clone):
+    with zipfile.ZipFile(packed) as file:
+        names = set(file.namelist())
+    assert {"results/tables/fig1.csv", "results/claims.csv", "results/views/still.sha256"} <= names
+    assert {"figures/fig1.pdf", "figures/fig1.png", "environment.lock", "Snakefile"} <= names
+    assert {"logs/benchmarks/table.tsv", "ro-crate-metadata.json", "ARCHIVE.md"} <= names
+    assert not {name for name in names if "keypoints/" in name or "views/still/" in name}
+    assert found(packed, clone) == {}
+    assert not (clone / "results").exists() and not (clone / ".snakemake").exists()
+
+
+def test_what_is_left_out_is_listed_with_digests(packed, ran):
+    with zipfile.ZipFile(packed) as file:
+        rows = file.read(archive.LEFT_OUT).decode().splitlines()
+        guide = file.read("ARCHIVE.md").decode()
+    keypoints = (ran.project / "results/keypoints/still.csv").read_bytes()
+    seal = (ran.project / "results/views/still.sha256").read_bytes()
+    size = sum(
+        path.stat().st_size
+        for path in (ran.project / "results/views/still").iterdir()
+        if not path.name.startswith(".")
+    )
+    assert rows == [
+        "path,bytes,sha256,rule",
+        f"results/keypoints/still.csv,{len(keypoints)},{hashlib.sha256(keypoints).hexdigest()},keypoints",
+        f"results/views/still,{size},{hashlib.sha256(seal).hexdigest()},views",
+    ]
+    assert "| `results/keypoints` | 1 |" in guide and "| `results/views` | 1 |" in guide
+
+
+def test_the_same_run_gives_the_same_bytes_and_no_time(packed, here, tmp_path):
+    for path in here.project.rglob("*.csv"):
+        path.touch()
+    again = archive.pack(here, tmp_path / "again.zip")
+    assert again.read_bytes() == packed.read_bytes()
+    with zipfile.ZipFile(packed) as file:
+        infos = file.infolist()
+        assert {info.date_time for info in infos} == {(1980, 1, 1, 0, 0, 0)}
+        assert [info.filename for info in infos] == sorted(info.filename for info in infos)
+        records = [name for name in file.namelist() if name.startswith(".snakemake/metadata/")]
+        assert len(records) == 7
+        for name in records:
+            record = json.loads(file.read(name))
+            assert record["starttime"] == 0.0 and 0 <= record["endtime"] < 60
+
+
+def test_an_unfinished_run_is_not_packed(here, tmp_path):
+    (here.project / "results/tables/fig1.csv").write_text("n_spo,found\n3,9\n")
+    with pytest.raises(InputError, match=r"fig1\.\w+ and \d more: missing or not up to date"):
+        archive.pack(here, tmp_path / "none.zip")
+    assert list(tmp_path.iterdir()) == [here.project]
+
+
+def test_results_whose_intermediate_files_were_deleted_are_packed_all_the_same(
+    here, packed, tmp_path
+):
+    shutil.rmtree(here.project / "results/views/still")
+    (here.project / "results/keypoints/still.csv").unlink()
+    again = archive.pack(here, tmp_path / "again.zip")
+    with zipfile.ZipFile(packed) as one, zipfile.ZipFile(again) as other:
+        before, after = (
+            [line.split(",")[2] for line in file.read(archive.LEFT_OUT).decode().splitlines()]
+            for file in (one, other)
+        )
+    assert before == after
+
+
+@pytest.mark.parametrize(
+    "name", ["results/tables/fig1.csv", "figures/fig1.pdf", "results/claims.csv", "Snakefile"]
+)
+def test_a_file_that_was_tampered_with_is_named(packed, tmp_path, name):
+    with zipfile.ZipFile(packed) as file:
+        data = bytearray(file.read(name))
+    data[len(data) // 2] ^= 1
+    with verification.unpacked(
+        rewritten(packed, tmp_path / "t.zip", {name: bytes(data)}, False)
+    ) as folder:
+        assert verification.check_digests(folder).problems == [f"{name}: damaged or changed"]
+
+
+def test_files_lost_added_and_damaged_in_the_zip_are_named(packed, tmp_path):
+    changes: dict[str, bytes | None] = {"results/claims.csv": None, "more.txt": b"1"}
+    path = rewritten(packed, tmp_path / "t.zip", changes, False)
+    data = path.read_bytes()
+    assert data.count(b"free\n") == 1
+    path.write_bytes(data.replace(b"free\n", b"fred\n"))  # the checksum in the zip is the old one
+    with verification.unpacked(path) as folder:
+        assert verification.check_digests(folder).problems == [
+            "results/claims.csv: missing",
+            "LICENSE: damaged or changed",
+            "more.txt: not in SHA256SUMS",
+        ]
+
+
+def test_a_forged_table_does_not_pass_though_all_digests_were_adapted(packed, clone, tmp_path):
+    changes: dict[str, bytes | None] = {"results/tables/fig1.csv": b"n_spo,found\n3,9\n"}
+    problems = found(rewritten(packed, tmp_path / "t.zip", changes, True), clone)
+    assert problems["figures"] == [
+        f"figures/fig1.{kind}: drawn from another fig1.csv than the one here (changed)"
+        for kind in ("pdf", "png")
+    ]
+    (told,) = problems["inputs"]
+    assert told.startswith("results/tables/fig1.csv: not as it was")
+    assert sorted(problems["workflow"]) == [
+        f"{job}: Updated input files: results/tables/fig1.csv" for job in ("Drawing", "Judging")
+    ]
+    assert "digests" not in problems
+
+
+def test_a_forged_seal_does_not_pass(packed, tmp_path):
+    changes: dict[str, bytes | None] = {"results/views/still.sha256": 64 * b"0" + b"  a\n"}
+    with verification.unpacked(rewritten(packed, tmp_path / "t.zip", changes, True)) as folder:
+        records = verification.read_records(folder)
+        check = verification._check_inputs(records, folder, verification._listed(folder))
+    assert check.problems == [
+        "results/views/still.sha256: not as it was when others were made from it"
+    ]
+
+
+def test_other_settings_code_and_lock_are_told_apart(packed, clone):
+    (clone / "config/config.yaml").write_text("blur: 0.9\nseed: 1\n")
+    problems = found(packed, clone)
+    assert list(problems) == ["workflow"]
+    assert problems["workflow"][0].startswith("Taking views: Params have changed")
+    assert "before: 1.1" in problems["workflow"][0] and len(problems["workflow"]) == 1
+
+    small_study.write(clone, CODE)
+    (clone / "LICENSE").write_text("free, still\n")
+    (clone / "Snakefile").write_text(small_study.SNAKEFILE.replace("CODE", repr(CODE)) + "# bye\n")
+    assert found(packed, clone) == {}  # a comment changes no result
+
+    (clone / "environment.lock").write_text("numpy==3\n")
+    problems = found(packed, clone)
+    assert (
+        problems["figures"][0]
+        == "figures/fig1.pdf: drawn under another environment.lock than is here"
+    )
+    assert problems["workflow"][0].startswith("Taking views: Params have changed")
+
+
+def test_figures_of_other_code_are_named(packed, ran, monkeypatch):
+    monkeypatch.setattr(verification, "code_of_figure", lambda figure: 64 * "0")
+    with verification.unpacked(packed) as folder:
+        check = verification._check_figures(folder, verification.read_about(folder), ran.project)
+    assert check.problems == [
+        f"figures/fig1.{kind}: drawn by other code than is here" for kind in ("pdf", "png")
+    ]
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", None])
+def test_what_is_no_archive_is_refused(content, clone, tmp_path, packed):
+    path = tmp_path / "a.zip"
+    path.write_bytes(packed.read_bytes()[:5000] if content is None else content)
+    with pytest.raises(InputError, match="a.zip: not a whole zip file"):
+        verification.check_archive(path, clone)
+
+
+def test_archives_that_write_elsewhere_are_refused(clone, tmp_path):
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("../escaped.txt", "")
+    with pytest.raises(InputError, match="leads out of its folder"):
+        verification.check_archive(path, clone)
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("a.txt", "")
+    with pytest.raises(InputError, match="no archive of this study"):
+        verification.check_archive(path, clone)
+    assert not (tmp_path.parent / "escaped.txt").exists()
+
+
+def test_results_that_are_here_are_checked_down_to_the_chunk(here, monkeypatch, capsys):
+    monkeypatch.chdir(here.project)
+    assert cli.main(["verify"]) == 0
+    assert "1 with every chunk as sealed" in capsys.readouterr().out
+    (here.project / "results/views/still/b").write_text("3,1.2\n")
+    (here.project / "results/keypoints/still.csv").write_text("n_spo,found\n")
+    assert cli.main(["verify"]) == 1
+    said = capsys.readouterr().out
+    assert "results/views/still: b is damaged" in said
+    assert "results/keypoints/still.csv: not as it was when others were made from it" in said
+    assert "NOT verified" in said
+
+
+def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp_path):
+    with verification.unpacked(packed) as source:
+        checks, sound = verification.recompute(source, clone, ["all"], 1)
+        assert sound and [check.what for check in checks] == [
+            "tables",
+            "figures",
+            "claims",
+            "left out",
+        ]
+        assert checks[0].words.startswith("1 of 1 the same to the last bit (same lock")
+        (clone / "config/scene.txt").write_text("5,0.2500000001\n7,\n")
+        checks, sound = verification.recompute(source, clone, ["fig1"], 1)
+        assert not sound
+        tables, figures, left_out = (check.problems for check in checks)
+        assert tables == [
+            "fig1.csv: found differs in 1 of 3 rows, most in row 2, by 1e-10: 0.25 became 0.2500000001"
+        ]
+        assert figures == ["figures/fig1.pdf: other bytes", "figures/fig1.png: other bytes"]
+        assert "results/views/still: 1 of 2 files differ, first b" in left_out
+
+        # The same run from another processor: numbers may differ by rounding, and no more.
+        about = json.loads((source / archive.ABOUT).read_text())
+        (source / archive.ABOUT).write_text(json.dumps(about | {"arithmetic": "another"}))
+        made = tmp_path / "made"
+        (made / "tables").mkdir(parents=True)
+        (made / "tables/fig1.csv").write_text("n_spo,found\n3,1.1\n5,0.2500000001\n7,\n")
+        check = verification.compare_tables(source, made, about["lock"])
+        assert check.problems == [] and "by 1e-10" in check.notes[0]
+        (made / "tables/fig1.csv").write_text("n_spo,found\n3,1.1\n5,0.2501\n7,\n")
+        assert "by 0.0001" in verification.compare_tables(source, made, about["lock"]).problems[0]
+        with pytest.raises(InputError, match="fig9: no figure; give fig1 or all"):
+            verification.recompute(source, clone, ["fig9"], 1)
+
+
+def test_the_reference_holds_what_is_small_and_is_compared_with(here, monkeypatch, capsys):
+    monkeypatch.chdir(here.project)
+    assert cli.main(["reference"]) == 0
+    folder = here.project / "results/reference"
+    names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert names == {
+        "SHA256SUMS", "archive.json", "claims.csv", "figures/fig1.png", "left-out.csv", "tables/fig1.csv",
+    }  # fmt: skip
+    before = {name: (folder / name).read_bytes() for name in names}
+    assert cli.main(["reference"]) == 0
+    assert before == {name: (folder / name).read_bytes() for name in names}
+    assert cli.main(["verify"]) == 0
+    assert "tables: 1 of 1 the same to the last bit" in capsys.readouterr().out
+    (folder / "tables/fig1.csv").write_text("n_spo,found\n3,7\n")
+    assert cli.main(["verify"]) == 1
+    said = capsys.readouterr().out
+    assert (
+        "tables/fig1.csv: damaged or changed" in said
+        and "fig1.csv: has 3 rows instead of 1" in said
+    )
+
+
+def test_whence_follows_a_figure_to_the_scene_and_says_what_changed(here, monkeypatch, capsys):
+    monkeypatch.chdir(here.project / "results")
+    assert cli.main(["whence", "../figures/fig1.pdf"]) == 0
+    said = capsys.readouterr().out
+    digest = hashlib.sha256((here.project / "results/tables/fig1.csv").read_bytes()).hexdigest()
+    assert f"  results/tables/fig1.csv  {digest}  unchanged\n" in said
+    order = [said.index(f"\n  {rule}\n") for rule in ("table", "keypoints", "views")]
+    assert order == sorted(order)
+    assert "drawn with\n  python workflow/jobs.py fig1 figures/fig1.pdf figures/fig1.png" in said
+    assert "CHANGED" not in said and "not here" not in said and said.count("  as it is here") == 2
+
+    shutil.move(here.project / "figures/fig1.png", here.project / "somewhere.png")
+    (here.project / "results/tables/fig1.csv").write_text("n_spo,found\n")
+    (here.project / "environment.lock").write_text("")
+    (here.project / "results/keypoints/still.csv").unlink()
+    assert cli.main(["whence", "../somewhere.png"]) == 0
+    said = capsys.readouterr().out
+    assert f"results/tables/fig1.csv  {digest}  CHANGED since then" in said
+    assert re.search(r"still.csv  \w{12}  not here", said) and "config/scene.txt" in said
+    assert said.count("not as it is here") == 1
+
+    shutil.rmtree(here.project / ".snakemake")
+    assert cli.main(["whence", "../figures/fig1.pdf"]) == 0
+    said = capsys.readouterr().out
+    assert f"fig1.csv  {digest}  " in said and "know no such figure" in said
+
+
+def test_whence_names_the_command_with_its_settings(here):
+    assert (
+        list(provenance._commands("figures/fig1.pdf", here.project))[0] == "make figures/fig1.pdf"
+    )
+    (here.project / "config/what_if").mkdir()
+    (here.project / "config/what_if/sharp.yaml").write_text("figures: figures/sharp\n")
+    (here.project / "config/broken.yaml").write_text("{")
+    make, snakemake = provenance._commands("figures/sharp/fig1.pdf", here.project)
+    assert make == "make figures/sharp/fig1.pdf WITH=config/what_if/sharp.yaml"
+    assert snakemake.endswith("figures/sharp/fig1.pdf -j2 --configfile config/what_if/sharp.yaml")
+    make, _ = provenance._commands("figures/lost/fig1.pdf", here.project)
+    assert make == "make figures/lost/fig1.pdf WITH=the settings whose figures go to figures/lost"
+
+
+def test_the_crate_describes_every_file_and_the_run(packed):
+    with zipfile.ZipFile(packed) as file:
+        crate = json.loads(file.read("ro-crate-metadata.json"))
+        members = {name: file.read(name) for name in file.namelist()}
+    entities = {entity["@id"]: entity for entity in crate["@graph"]}
+    assert len(entities) == len(crate["@graph"])
+    files = {name for name, entity in entities.items() if "File" in entity["@type"]}
+    hidden = {name for name in members if name.startswith(".")}
+    assert files == members.keys() - hidden - {"SHA256SUMS", "ro-crate-metadata.json"}
+    for name in files:
+        assert entities[name]["sha256"] == hashlib.sha256(members[name]).hexdigest()
+        assert entities[name]["contentSize"] == str(len(members[name]))
+    root, run = entities["./"], entities["#run"]
+    assert {part["@id"] for part in root["hasPart"]} == files
+    assert root["mentions"] == {"@id": "#run"} and root["mainEntity"] == run["instrument"]
+    assert {it["@id"] for it in run["result"]} == {
+        "figures/fig1.pdf", "figures/fig1.png", "results/claims.csv", "results/tables/fig1.csv",
+        "results/views/still.sha256",
+    }  # fmt: skip
+    assert {it["@id"] for it in run["object"]} == {
+        "config/config.yaml", "config/scene.txt", "environment.lock",
+    }  # fmt: skip
+    for entity in crate["@graph"]:  # whatever is referred to is described, or is a web page
+        for value in entity.values():
+            for reference in value if isinstance(value, list) else [value]:
+                if isinstance(reference, dict):
+                    name = reference["@id"]
+                    assert name in entities or re.match("https?://", name)
+
+
+def test_the_real_study_is_finished_without_its_intermediate_files(touched, tmp_path):
+    study = Study(touched.folder, ["config/quick.yaml"])
+    contents = archive.Contents.of(study)
+    left_out = {output.rule for output in contents.left_out}
+    assert left_out >= {"simulate", "detect", "detect_stored", "scale_space", "match_samplings"}
+    assert not left_out & {"fig5", "score_features", "claims"}
+    with verification.unpacked(archive.pack(study, tmp_path / "quick.zip")) as folder:
+        about = verification.read_about(folder)
+        assert not (folder / "results/quick/keypoints").exists()
+        check = verification._check_nothing_to_do(folder, about, touched.folder)
+    assert check.problems == []
