@@ -42,7 +42,9 @@ _SOURCES = (
 )  # fmt: skip
 """Files and folders that make up the project; a file that a copy lacks is not missed."""
 
-_REPORTS = ("*.html", "report/*.html")
+_MORE = ("*.html", "report/*.html", "claims_pictures.*")
+"""Results that are made only where they are asked for, by their places in the folder of results."""
+
 _PLAIN, _EXECUTABLE = 0o644, 0o755
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that the format knows
 
@@ -229,7 +231,7 @@ def _members(contents: Contents) -> Iterator[tuple[str, bytes]]:
         yield _overlay(number, overlay), (project / overlay).read_bytes()
     for output in contents.kept:
         yield output.path, (project / output.path).read_bytes()
-    for pattern in _REPORTS:
+    for pattern in _MORE:
         for path in sorted((project / study.results).glob(pattern)):
             yield path.relative_to(project).as_posix(), path.read_bytes()
     for record in contents.records.values():

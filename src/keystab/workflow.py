@@ -23,6 +23,7 @@ __all__ = ["Output", "Study", "find_project"]
 _FOLDERS = ("results", "figures", "logs")
 _JOB = re.compile(r"^Job \d+: (.*)\n *[Rr]eason: (.*)$", re.MULTILINE)
 _FOLLOWS = ("Input files updated by another job", "Missing output files")
+_DIGEST = re.compile("'[0-9a-f]{64}'")  # settings have names, see common.smk
 _LONG = re.compile("Union of exclusive params before and now across all output: ")
 
 
@@ -116,9 +117,9 @@ class Study:
             for job, why in found
         }
         jobs = {job: why for job, why in own.items() if why} or dict(found)
-        return [f"{job}: {_LONG.sub('', why).strip()}" for job, why in jobs.items()] or [
-            "jobs that snakemake --dry-run names"
-        ]
+        shortened = {job: _LONG.sub("", why).strip() for job, why in jobs.items()}
+        told = [f"{job}: {_DIGEST.sub('code or lock', why)}" for job, why in shortened.items()]
+        return told or ["jobs that snakemake --dry-run names"]
 
     def run(self, cores: int, *targets: str) -> None:
         """Make targets, or the whole study, showing what Snakemake says.

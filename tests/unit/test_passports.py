@@ -15,7 +15,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 from pypdf import PdfReader, PdfWriter
 
-from keystab import __version__, cli, fingerprint
+from keystab import __version__, cli
 from keystab.errors import InputError
 from keystab.figures._render import main, save
 from keystab.passports import PNG_KEY, Passport, digests_of
@@ -193,29 +193,3 @@ def test_the_command_of_a_figure_writes_what_it_was_told_and_what_it_read(tmp_pa
     assert main(lambda tables, draft: drawing(), needs, [*flags, "--draft"]) == 0
     by_hand = dataclasses.replace(expected, code=None, lock=None, settings={"draft": "True"})
     assert read_passport(tmp_path / "fig0.pdf") == by_hand
-
-
-def test_nothing_but_the_command_imports_the_rooms_that_come_last():
-    last = {
-        f"keystab.{name}"
-        for name in (
-            "archive",
-            "crate",
-            "differences",
-            "provenance",
-            "records",
-            "verification",
-            "workflow",
-        )
-    }
-    folder = fingerprint.PACKAGE_FOLDER
-    modules = {
-        ".".join(path.relative_to(folder.parent).with_suffix("").parts)
-        for path in folder.rglob("*.py")
-    }
-    modules = (
-        {name.removesuffix(".__init__") for name in modules} - last - {"keystab", "keystab.cli"}
-    )
-    assert last.isdisjoint({"keystab.passports"} | modules) and len(modules) > 100
-    for module in modules:
-        assert last.isdisjoint(fingerprint.imported_modules(module)), module

@@ -28,6 +28,7 @@ def imported(path: Path) -> set[str]:
     return names
 
 
+LAST = ("records", "workflow", "provenance", "differences", "crate", "archive", "verification")
 IMPORTS = {name: imported(path) for name, path in FILES.items()}
 
 
@@ -50,10 +51,18 @@ def test_the_science_knows_neither_stages_nor_figures():
 
 def test_figures_read_tables_and_nothing_else():
     allowed = {"keystab.errors", "keystab.files", "keystab.tables", "keystab.checks"}
+    allowed |= {"keystab.passports"}
     for name, names in IMPORTS.items():
         if room(name) == "figures":
             known = {other for other in names & set(FILES) if room(other) != "figures"}
             assert known <= allowed, name
+
+
+def test_nothing_but_the_command_knows_the_rooms_that_come_last():
+    last = {f"keystab.{name}" for name in LAST}
+    assert last <= set(FILES)
+    for name, names in IMPORTS.items():
+        assert name in last | {"keystab.cli"} or last.isdisjoint(names), name
 
 
 @pytest.mark.parametrize(

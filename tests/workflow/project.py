@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -40,40 +41,12 @@ class Project:
         )
 
     def dry_run(self, *arguments: str) -> tuple[int, str]:
-        """Run Snakemake without running jobs; its exit status and what it said.
+        """Run Snakemake without running jobs; its exit status and what it said."""
+        status, output, errors = in_fork(self._become, ["--cores", "1", "--dry-run", *arguments])
+        return status, output + errors
 
-        In a fork of this process, which has imported Snakemake already: half the time.
-        """
-        import snakemake.cli
-
-        with tempfile.TemporaryFile("w+") as said:
-            process = os.fork()
-            if process == 0:
-                status = 1
-                try:
-                    self._become(said.fileno())
-                    snakemake.cli.main(["--cores", "1", "--dry-run", *arguments])
-                    status = 0
-                except SystemExit as end:
-                    status = end.code if isinstance(end.code, int) else int(end.code is not None)
-                    if isinstance(end.code, str):
-                        print(end.code)
-                except BaseException:
-                    traceback.print_exc()
-                finally:
-                    sys.stdout.flush()
-                    sys.stderr.flush()
-                    os._exit(status)
-            _, ended = os.waitpid(process, 0)
-            said.seek(0)
-            return os.waitstatus_to_exitcode(ended), said.read()
-
-    def _become(self, output: int) -> None:
-        """Make this process one in the copy's folder, with its library and an output of its own."""
-        os.dup2(output, 1)
-        os.dup2(output, 2)
-        sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
-        sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
+    def _become(self) -> None:
+        """Make this process one in the copy's folder, with its library."""
         os.chdir(self.folder)
         os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         os.environ["PYTHONPATH"] = str(self.library)
@@ -98,13 +71,13 @@ class Project:
         path.write_text(text.replace(old, new, 1))
 
 
-def forked(
-    command: list[str], cwd: Path, env: dict[str, str], **_options: object
-) -> subprocess.CompletedProcess[str]:
-    """What `subprocess.run` does, for Snakemake: in a fork of this process, which has it loaded."""
+def in_fork(prepare: Callable[[], None], arguments: list[str]) -> tuple[int, str, str]:
+    """Run Snakemake; its exit status, output and errors.
+
+    In a fork of this process, which has imported Snakemake already: half the time.
+    """
     import snakemake.cli
 
-    assert command[:3] == [sys.executable, "-m", "snakemake"]
     with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
         process = os.fork()
         if process == 0:
@@ -114,12 +87,13 @@ def forked(
                 os.dup2(errors.fileno(), 2)
                 sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
                 sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
-                os.chdir(cwd)
-                os.environ.update(env)
-                snakemake.cli.main(command[3:])
+                prepare()
+                snakemake.cli.main(arguments)
                 status = 0
             except SystemExit as end:
                 status = end.code if isinstance(end.code, int) else int(end.code is not None)
+                if isinstance(end.code, str):
+                    print(end.code)
             except BaseException:
                 traceback.print_exc()
             finally:
@@ -131,7 +105,20 @@ def forked(
         for file in (output, errors):
             file.seek(0)
             said.append(file.read())
-        return subprocess.CompletedProcess(command, os.waitstatus_to_exitcode(ended), *said)
+        return os.waitstatus_to_exitcode(ended), said[0], said[1]
+
+
+def forked(
+    command: list[str], cwd: Path, env: dict[str, str], **_options: object
+) -> subprocess.CompletedProcess[str]:
+    """Do for Snakemake what `subprocess.run` does, with `in_fork`."""
+
+    def prepare() -> None:
+        os.chdir(cwd)
+        os.environ.update(env)
+
+    assert command[:3] == [sys.executable, "-m", "snakemake"]
+    return subprocess.CompletedProcess(command, *in_fork(prepare, command[3:]))
 
 
 def copy_of_project(folder: Path, own_library: bool = True) -> Project:
