@@ -206,7 +206,7 @@ def reference(args: argparse.Namespace) -> None:
 
 def verify(args: argparse.Namespace) -> int:
     """Check an archive, or the results that are here; recompute figures on request."""
-    from keystab import verification
+    from keystab import recomputation, verification
     from keystab.provenance import file_digest
     from keystab.workflow import Study, find_project
 
@@ -222,7 +222,7 @@ def verify(args: argparse.Namespace) -> int:
     print(verification.report(checks), flush=True)
     if args.recompute:
         with _run_to_compare(args.archive, project) as source:
-            checks, same = verification.recompute(
+            checks, same = recomputation.recompute(
                 source, project, args.recompute, args.cores, args.rtol, args.atol
             )
         print(f"recomputed {' '.join(args.recompute)}\n{verification.report(checks)}")

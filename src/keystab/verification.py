@@ -1,7 +1,7 @@
-"""Check an archive, the committed reference or the results that are here; recompute on request.
+"""Check an archive, the committed reference or the results that are here, computing nothing.
 
 Each check answers with one line, and names what does not hold. Nothing of the project's own results
-is touched: archives are unpacked, and figures recomputed, in temporary folders.
+is touched: archives are unpacked in temporary folders.
 """
 
 from __future__ import annotations
@@ -27,7 +27,20 @@ from keystab.records import Record, read_records, upstream
 from keystab.seals import verify as verify_seal
 from keystab.workflow import Study
 
-__all__ = ["Check", "check_archive", "check_here", "recompute", "report", "require_archive"]
+__all__ = [
+    "Check",
+    "alike",
+    "check_archive",
+    "check_digests",
+    "check_here",
+    "compare_tables",
+    "copy_workflow",
+    "left_out_digests",
+    "read_about",
+    "report",
+    "require_archive",
+    "unpacked",
+]
 
 _MOST_NAMED = 10
 _WORKFLOW = ("Snakefile", "environment.lock", "workflow", "profiles", "config")
@@ -149,7 +162,7 @@ def check_archive(archive: Path, project: Path) -> tuple[list[Check], bool]:
             check_digests(folder),
             _check_sources(folder, project),
             _check_figures(folder, about, project),
-            _check_inputs(read_records(folder), folder, _listed(folder)),
+            _check_inputs(read_records(folder), folder, left_out_digests(folder)),
             _check_nothing_to_do(folder, about, project),
         ]
     return checks, not any(check.problems for check in checks)
@@ -324,7 +337,7 @@ def check_here(study: Study) -> tuple[list[Check], bool]:
     return checks, not any(check.problems for check in checks)
 
 
-def _listed(folder: Path) -> dict[str, str]:
+def left_out_digests(folder: Path) -> dict[str, str]:
     """Digests of the files that a run left out, by their paths; none where nothing was."""
     path = folder / LEFT_OUT
     if not path.is_file():
@@ -396,13 +409,15 @@ def compare_tables(
     Check
     """
     about = read_about(expected)
-    alike = _alike(about, lock)
+    same_machine = alike(about, lock)
     tables = expected / "tables"
     if not tables.is_dir():
         tables = expected / about["results"] / "tables"
     paths = sorted(tables.glob("*.csv")) + sorted(tables.glob("*.parquet"))
     paths = [path for path in paths if not names or path.name in names]
-    problems: list[str] = []
+    left_out = {PurePosixPath(path).name for path in left_out_digests(expected)}
+    new = sorted(set(names) - {path.name for path in paths} - left_out)
+    problems = [f"{name}: not in the run that it is compared with" for name in new]
     notes: list[str] = []
     same = 0
     for path in paths:
@@ -414,145 +429,13 @@ def compare_tables(
         else:
             it = differences.file_difference(path, other, rtol, atol)
             told = f"{path.name}: {it.words or 'the same numbers in other bytes'}"
-            (notes if it.within and not alike else problems).append(told)
+            (notes if it.within and not same_machine else problems).append(told)
     allowed = f"numbers may differ by {rtol:g} of their size or by {atol:g}"
-    why = "same lock and processor" if alike else f"another lock or processor: {allowed}"
+    why = "same lock and processor" if same_machine else f"another lock or processor: {allowed}"
     words = f"{same} of {len(paths)} the same to the last bit ({why})"
     return Check("tables", words, problems, notes)
 
 
-def recompute(
-    source: Path,
-    project: Path,
-    targets: Sequence[str],
-    cores: int,
-    rtol: float = differences.RTOL,
-    atol: float = differences.ATOL,
-) -> tuple[list[Check], bool]:
-    """Compute figures again from the picture on and compare with a run.
-
-    Parameters
-    ----------
-    source : path
-        The run: an unpacked archive, or the folder of the reference.
-    project : path
-        Copy of the project whose code, settings and lock are used.
-    targets : sequence of str
-        Names of figures, such as ``fig5``; or ``all``.
-    cores : int
-        Jobs at a time.
-    rtol, atol : float, optional
-        See `compare_tables`.
-
-    Returns
-    -------
-    checks : list of Check
-        How tables, figures, verdicts and intermediate files compare.
-    sound : bool
-        Whether nothing failed.
-
-    Raises
-    ------
-    InputError
-        If a figure is none of the study, or a job fails.
-    """
-    about = read_about(source)
-    everything = list(targets) == ["all"]
-    with tempfile.TemporaryDirectory() as name:
-        scratch = Path(name)
-        copy_workflow(project, scratch)
-        if (source / "settings").is_dir():
-            shutil.copytree(source / "settings", scratch / "settings")
-        study = Study(scratch, about["overlays"])
-        drawn = [
-            f"{study.figures}/{target}.{kind}" for target in targets for kind in ("pdf", "png")
-        ]
-        known = {output.path for output in study.outputs()}
-        for path in [] if everything else drawn:
-            if path not in known:
-                figures = sorted({Path(it).stem for it in known if it.startswith(study.figures)})
-                raise InputError(f"{Path(path).stem}: no figure; give {', '.join(figures)} or all")
-        study.run(cores, *([] if everything else drawn))
-        records = read_records(scratch)
-        tables = [
-            PurePosixPath(path).name
-            for path in records
-            if path.startswith(f"{study.results}/tables/")
-        ]
-        checks = [
-            compare_tables(source, scratch / study.results, study.lock_digest, tables, rtol, atol),
-            _compare_figures(source, study, records, about),
-        ]
-        if everything:
-            checks.append(_compare_verdicts(source, scratch / study.results, about))
-        checks.append(_compare_left_out(source, study, records, about))
-    return checks, not any(check.problems for check in checks)
-
-
-def _alike(about: Mapping[str, Any], lock: str) -> bool:
+def alike(about: Mapping[str, Any], lock: str) -> bool:
     """Whether a run had this software and this kind of processor: then all bits are the same."""
     return bool(about["lock"] == lock and about.get("arithmetic") == arithmetic())
-
-
-def _compare_figures(
-    source: Path, study: Study, records: Mapping[str, Record], about: Mapping[str, Any]
-) -> Check:
-    """Compare drawn figures byte by byte; they carry the digests of their tables."""
-    inside = source / about["figures"]
-    inside = inside if inside.is_dir() else source / "figures"
-    paths = [path for path in records if path.startswith(f"{study.figures}/")]
-    paths = [path for path in paths if (inside / PurePosixPath(path).name).is_file()]
-    told = [
-        f"{path}: other bytes"
-        for path in paths
-        if (study.project / path).read_bytes() != (inside / PurePosixPath(path).name).read_bytes()
-    ]
-    words = f"{len(paths) - len(told)} of {len(paths)} the same to the last bit"
-    alike = _alike(about, study.lock_digest)
-    return Check("figures", words, told if alike else [], [] if alike else told)
-
-
-def _compare_verdicts(source: Path, found: Path, about: Mapping[str, Any]) -> Check:
-    """Compare the verdicts on claims."""
-    path = source / "claims.csv"
-    path = path if path.is_file() else source / about["results"] / "claims.csv"
-    before, after = _verdicts(path), _verdicts(found / "claims.csv")
-    problems = [
-        f"{name}: {before.get(name, 'no verdict')} became {after.get(name, 'no verdict')}"
-        for name in sorted(before.keys() | after.keys())
-        if before.get(name) != after.get(name)
-    ]
-    return Check("claims", f"{len(before)} verdicts the same", problems)
-
-
-def _verdicts(path: Path) -> dict[str, str]:
-    with path.open(newline="", encoding="utf-8") as lines:
-        rows = list(csv.DictReader(lines))
-    return {row["id"]: row["verdict"] for row in rows}
-
-
-def _compare_left_out(
-    source: Path, study: Study, records: Mapping[str, Record], about: Mapping[str, Any]
-) -> Check:
-    """Compare files that were left out with the digests that were not."""
-    digests = _listed(source)
-    made = sorted(digests.keys() & records.keys())
-    other = []
-    for path in made:
-        seal = study.project / f"{path}.sha256"
-        store = (study.project / path).is_dir()
-        if file_digest(seal if store else study.project / path) != digests[path]:
-            other.append(f"{path}: {_other_chunks(source, seal, path) if store else 'other bytes'}")
-    words = f"{len(made) - len(other)} of {len(made)} the same to the last bit"
-    alike = _alike(about, study.lock_digest)
-    return Check("left out", words, other if alike else [], [] if alike else other)
-
-
-def _other_chunks(source: Path, seal: Path, path: str) -> str:
-    """Name the files of a store that are not as its archived seal says."""
-    archived = source / f"{path}.sha256"
-    if not archived.is_file():
-        return "other bytes"
-    before, after = (read_sums(it.read_text(encoding="utf-8")) for it in (archived, seal))
-    names = [name for name in sorted(before | after) if before.get(name) != after.get(name)]
-    return f"{len(names)} of {len(before)} files differ, first {names[0]}"

@@ -28,7 +28,8 @@ def imported(path: Path) -> set[str]:
     return names
 
 
-LAST = ("records", "workflow", "provenance", "differences", "crate", "archive", "verification")
+LAST = ("records", "workflow", "provenance", "differences", "crate", "archive")
+LAST += ("verification", "recomputation")
 IMPORTS = {name: imported(path) for name, path in FILES.items()}
 
 

@@ -14,7 +14,7 @@ import pytest
 import small_study
 from project import forked
 
-from keystab import archive, cli, provenance, verification
+from keystab import archive, cli, provenance, recomputation, verification
 from keystab.errors import InputError
 from keystab.fingerprint import fingerprint
 from keystab.workflow import Study
@@ -191,7 +191,7 @@ def test_a_forged_seal_does_not_pass(packed, tmp_path):
     changes: dict[str, bytes | None] = {"results/views/still.sha256": 64 * b"0" + b"  a\n"}
     with verification.unpacked(rewritten(packed, tmp_path / "t.zip", changes, True)) as folder:
         records = verification.read_records(folder)
-        check = verification._check_inputs(records, folder, verification._listed(folder))
+        check = verification._check_inputs(records, folder, verification.left_out_digests(folder))
     assert check.problems == [
         "results/views/still.sha256: not as it was when others were made from it"
     ]
@@ -266,7 +266,7 @@ def test_results_that_are_here_are_checked_down_to_the_chunk(here, monkeypatch, 
 
 def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp_path):
     with verification.unpacked(packed) as source:
-        checks, sound = verification.recompute(source, clone, ["all"], 1)
+        checks, sound = recomputation.recompute(source, clone, ["all"], 1)
         assert sound and [check.what for check in checks] == [
             "tables",
             "figures",
@@ -275,7 +275,7 @@ def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp
         ]
         assert checks[0].words.startswith("1 of 1 the same to the last bit (same lock")
         (clone / "config/scene.txt").write_text("5,0.2500000001\n7,\n")
-        checks, sound = verification.recompute(source, clone, ["fig1"], 1)
+        checks, sound = recomputation.recompute(source, clone, ["fig1"], 1)
         assert not sound
         tables, figures, left_out = (check.problems for check in checks)
         assert tables == [
@@ -295,7 +295,7 @@ def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp
         (made / "tables/fig1.csv").write_text("n_spo,found\n3,1.1\n5,0.2501\n7,\n")
         assert "by 0.0001" in verification.compare_tables(source, made, about["lock"]).problems[0]
         with pytest.raises(InputError, match="fig9: no figure; give fig1 or all"):
-            verification.recompute(source, clone, ["fig9"], 1)
+            recomputation.recompute(source, clone, ["fig9"], 1)
 
 
 def test_the_reference_holds_what_is_small_and_is_compared_with(here, monkeypatch, capsys):
