@@ -106,14 +106,13 @@ def _column(
     both = missing[0] & missing[1]
     if numeric:
         a, b = expected.to_numpy(dtype=float), found.to_numpy(dtype=float)
-        with np.errstate(invalid="ignore"):
-            distance = np.where(a == b, 0.0, np.abs(b - a))
-        distance[both] = 0.0
-        distance[np.isnan(distance)] = np.inf
         allowed = atol + rtol * np.abs(np.where(np.isfinite(a), a, 0.0))
-        excess = np.divide(
-            distance, allowed, out=np.where(distance > 0, np.inf, 0.0), where=allowed > 0
-        )
+        with np.errstate(invalid="ignore", over="ignore"):
+            distance = np.where(a == b, 0.0, np.abs(b - a))
+            distance[both] = 0.0
+            distance[np.isnan(distance)] = np.inf
+            beyond = np.where(distance > 0, np.inf, 0.0)
+            excess = np.divide(distance, allowed, out=beyond, where=allowed > 0)
     else:
         same = (expected.astype(str).to_numpy() == found.astype(str).to_numpy()) | both
         excess = np.where(same & (missing[0] == missing[1]), 0.0, np.inf)
@@ -125,7 +124,9 @@ def _column(
     amount = ""
     if numeric and np.isfinite(distance[row]):
         size = abs(float(expected.iloc[row]))
-        share = f" ({distance[row] / size:.0%})" if size and distance[row] >= 0.01 * size else ""
+        share = (
+            f" ({distance[row] / size:.0%})" if 0.01 * size <= distance[row] < 100 * size else ""
+        )
         amount = f", by {distance[row]:.3g}{share}"
     told = (
         f"{name} differs in {differing} of {len(expected)} rows, most in row {row + 1}{amount}: "
