@@ -13,7 +13,7 @@ OVERLAY = $(if $(WITH),--configfile $(WITH))
 QUICK = --configfile config/quick.yaml
 
 .DEFAULT_GOAL := help
-.PHONY: help study quick archive verify reference test bench check check-workflow format lock why clean environment FORCE
+.PHONY: help study quick archive verify reference test bench check check-workflow format lock why clean environment test-slow FORCE
 
 help: ## List the targets
 	@echo "make study                  the whole study"
@@ -26,7 +26,7 @@ study: environment ## The whole study
 	$(SNAKEMAKE) $(OVERLAY)
 
 quick: environment ## Every figure in draft form, in some minutes
-	snakemake --cores $(CORES) $(QUICK)
+	$(SNAKEMAKE) $(QUICK)
 
 figures/quick/% results/quick/%: environment FORCE
 	$(SNAKEMAKE) $@ $(QUICK)
@@ -38,7 +38,10 @@ why: environment ## What would run, and why (TARGET=figures/fig5.pdf: for one fi
 	@snakemake --dry-run $(TARGET) $(OVERLAY)
 
 test: environment ## All tests
-	pytest -n 2
+	pytest -n 2 -m "not slow"
+
+test-slow: environment ## The tests that take minutes: twenty kills of the draft, a cluster
+	pytest -m slow
 
 archive: environment ## Pack the finished study into one file, results/archive/keystab-VERSION.zip
 	keystab archive $(OVERLAY)

@@ -10,7 +10,9 @@ share of the whole on any machine. Jobs that were never timed count like others 
 from __future__ import annotations
 
 import csv
+import functools
 import itertools
+import os
 import re
 import subprocess
 import sys
@@ -18,10 +20,15 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+import yaml
+
 DURATIONS = Path(__file__).with_name("durations.csv")
 
 JOB = re.compile(r"^Job (\d+): (.+)$")
 FINISHED = re.compile(r"^Finished jobid: (\d+) ")
+# What stages say about their input, disk or memory, and Snakemake about folders.
+REASONS = ("error: ", "OSError: ", "PermissionError: ")
+AGAIN = "mend that and type the same command again."
 UNKNOWN = 3.0  # seconds, for a job of which nothing is known
 
 
@@ -107,6 +114,20 @@ def config_files(arguments: list[str]) -> list[str]:
     return list(itertools.takewhile(lambda argument: not argument.startswith("-"), after))
 
 
+def not_writable(arguments: list[str]) -> list[str]:
+    """Folders of the settings in which nothing can be written."""
+    settings: dict[str, object] = {}
+    for name in ["config/config.yaml", *config_files(arguments)]:
+        settings.update(yaml.safe_load(Path(name).read_text()) or {})
+    folders = [".snakemake", *(str(settings[key]) for key in ("results", "figures", "logs"))]
+    return [folder for folder in folders if not os.access(existing(Path(folder)), os.W_OK)]
+
+
+def existing(folder: Path) -> Path:
+    """The folder, or where it does not exist the one in which it would be made."""
+    return folder if folder.exists() else existing(folder.absolute().parent)
+
+
 def read_durations(path: Path = DURATIONS) -> dict[str, float]:
     """Seconds that jobs took, by what they say; empty if nothing was written down."""
     if not path.is_file():
@@ -124,7 +145,7 @@ def write_durations(durations: dict[str, float], path: Path) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Plan, run, and report after every job."""
+    """Plan, run, and report after every job; at the end, what stopped it."""
     record = None
     if arguments[:1] == ["--record"]:
         record, arguments = Path(arguments[1]), arguments[2:]
@@ -132,13 +153,27 @@ def main(arguments: list[str]) -> int:
     if missing:
         print(f"error: {missing[0]}: no such file of settings; check WITH=", file=sys.stderr)
         return 2
+    from interrupted import take_up, why_locked  # beside this file
+
+    take_up(Path.cwd(), functools.partial(print, flush=True))
     snakemake = [sys.executable, "-m", "snakemake"]
     plan = subprocess.run([*snakemake, "--dry-run", *arguments], capture_output=True, text=True)
+    said = plan.stdout + plan.stderr
+    planned = jobs_of(said)
+    if (planned or "Write-protected output" in said) and (folders := not_writable(arguments)):
+        print(
+            f"error: {folders[0]} cannot be written to: mend that, or give another folder "
+            "(settings results, figures, logs)",
+            file=sys.stderr,
+        )
+        return 2
     if plan.returncode:  # says what is wrong
         return subprocess.run([*snakemake, *arguments]).returncode
-    clock = Clock(jobs_of(plan.stdout + plan.stderr), read_durations())
+    clock = Clock(planned, read_durations())
     began: dict[str, tuple[str, float]] = {}
     taken: dict[str, float] = {}
+    reasons: list[str] = []
+    locked = False
     start = time.monotonic()
     with subprocess.Popen(
         [*snakemake, *arguments],
@@ -152,6 +187,9 @@ def main(arguments: list[str]) -> int:
             for line in run.stdout:
                 print(line, end="", flush=True)
                 now = time.monotonic()
+                locked = locked or "Directory cannot be locked" in line
+                if line.startswith(REASONS) and line not in reasons:
+                    reasons.append(line)
                 if found := JOB.match(line):
                     began[found[1]] = (found[2], now)
                 elif (found := FINISHED.match(line)) and found[1] in began:
@@ -163,6 +201,10 @@ def main(arguments: list[str]) -> int:
             print(run.stdout.read(), end="", flush=True)
     if record is not None and run.returncode == 0:
         write_durations(taken, record)
+    if locked:
+        print(f"error: {why_locked(Path.cwd())}", file=sys.stderr)
+    elif reasons:
+        print(f"\nStopped by\n{''.join(reasons)}What was finished stays: {AGAIN}", file=sys.stderr)
     return run.returncode
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -49,7 +50,8 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     The block receives a temporary sibling of `path`, with the same suffix, hidden by a leading
     dot. When the block ends normally the sibling replaces `path` by renaming; when it raises, or
     is interrupted, the sibling is deleted and `path` is left as it was. A process killed outright
-    leaves hidden siblings behind, never a half-written `path`. A file replaces only a file, and a
+    leaves hidden siblings behind, never a half-written `path`; the next one that writes `path`
+    removes them. A file replaces only a file, and a
     folder only a folder.
 
     Parameters
@@ -84,6 +86,7 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     _check_folder(target)
     target.parent.mkdir(parents=True, exist_ok=True)
+    _remove_leftovers(target)
     part = target.with_name(f".part-{os.getpid()}-{target.name}")
     try:
         try:
@@ -117,6 +120,27 @@ def _put(part: Path, target: Path) -> None:
         old.rename(target)
         raise
     _remove(old)
+
+
+def _remove_leftovers(target: Path) -> None:
+    """Remove the hidden siblings of a path that killed processes left."""
+    pattern = re.compile(rf"\.(?:part|old)-(\d+)-{re.escape(target.name)}")
+    for sibling in target.parent.iterdir():
+        if (found := pattern.fullmatch(sibling.name)) and not _runs(int(found[1])):
+            _remove(sibling)
+
+
+def _runs(pid: int) -> bool:
+    """Whether there is a process of this number, as far as that can be asked."""
+    if os.name != "posix":  # where signal 0 is a real one
+        return True
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:  # somebody else's
+        return True
+    return True
 
 
 def _check_folder(path: Path) -> None:

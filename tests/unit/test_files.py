@@ -2,6 +2,7 @@
 
 import errno
 import os
+import subprocess
 
 import pytest
 
@@ -139,3 +140,16 @@ def test_the_place_of_a_file_is_checked_beforehand(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="cannot be written to"):
         check_writable(tmp_path / "new" / "t.csv")
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next_that_writes(tmp_path):
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    target = tmp_path / "result.txt"
+    left = [f".part-{dead.pid}-result.txt", f".old-{dead.pid}-result.txt"]
+    kept = [f".part-{os.getppid()}-result.txt", f".part-{dead.pid}-other.txt", "result.txt.part"]
+    for name in left + kept:
+        (tmp_path / name).write_text("half")
+    with written_whole(target) as part:
+        part.write_text("whole")
+    assert {path.name for path in tmp_path.iterdir()} == {"result.txt", *kept}

@@ -24,17 +24,21 @@ class Project:
         self.folder = folder
         self.library = (folder if own_library else ROOT) / "src"
 
-    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run Snakemake on the copy."""
-        environment = {
+    @property
+    def environment(self) -> dict[str, str]:
+        """Variables that make commands run in the copy use its library."""
+        return {
             **os.environ,
             "PYTHONPATH": str(self.library),
             "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         }
+
+    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run Snakemake on the copy."""
         return subprocess.run(
             [sys.executable, "-m", "snakemake", "--cores", "1", *arguments],
             cwd=self.folder,
-            env=environment,
+            env=self.environment,
             text=True,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

@@ -9,6 +9,7 @@ the code and the software.
 import hashlib
 import math
 import os
+import platform
 import shlex
 import sys
 from functools import reduce
@@ -92,6 +93,8 @@ def setting(place):
 
 
 onstart:
+    # Tells a killed run's lock from that of a run on another machine; see tools/interrupted.py.
+    Path(".snakemake/host").write_text(platform.node())
     # Snakemake 9 limits the rate at which jobs start to 100 a second, and for that wakes up once a
     # second more for every job that has finished: after a hundred it takes a good part of a core.
     # Jobs here take seconds, so that nothing is lost without the limit.
