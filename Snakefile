@@ -16,6 +16,7 @@ configfile: "config/config.yaml"
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/sets.smk"
+include: "workflow/rules/resources.smk"
 include: "workflow/rules/simulate.smk"  # the reference picture -> sets of views
 include: "workflow/rules/scale_space.smk"  # a view -> a stored scale-space, where one is kept
 include: "workflow/rules/detect.smk"  # a view or its scale-space -> extrema, with refinement traces

@@ -18,7 +18,7 @@ rule claims:
     """A verdict for every claim of the paper."""
     input:
         tables=expand(f"{RESULTS}/tables/{{table}}.csv", table=CLAIMED_TABLES),
-        claims="config/claims.yaml",
+        claims=local("config/claims.yaml"),
     output:
         csv=f"{RESULTS}/claims.csv",
         json=f"{RESULTS}/claims.json",

@@ -22,6 +22,9 @@ rule detect:
         f"{LOGS}/benchmarks/detect/n{{n_spo}}.tsv"
     wildcard_constraints:
         n_spo=one_of(STREAMED),
+    resources:
+        runtime=minutes_of_view,
+        mem_mb=memory_of_store,
     params:
         sigma_min=setting("detector.sigma_min"),
         kappa=setting("detector.kappa"),
@@ -99,6 +102,8 @@ rule detect_grid:
         f"{LOGS}/detect_grid/n{{n_spo}}.log",
     benchmark:
         f"{LOGS}/benchmarks/detect_grid/n{{n_spo}}.tsv"
+    resources:
+        runtime=minutes_of_grid,
     params:
         delta_min=setting("grid.delta_min"),
         sigma_min=setting("detector.sigma_min"),
@@ -139,6 +144,9 @@ rule detect_views:
         f"{LOGS}/benchmarks/detect_views/{{set}}_n{{n_spo}}.tsv"
     wildcard_constraints:
         set=one_of(STREAMED_SETS),
+    resources:
+        runtime=minutes_of_set,
+        mem_mb=memory_of_store,
     params:
         assumed_blur=assumed_blur_of_set,
         n_oct=setting("sets.{set}.n_oct"),
@@ -202,6 +210,8 @@ rule detect_kappas:
         f"{LOGS}/detect_kappas.log",
     benchmark:
         f"{LOGS}/benchmarks/detect_kappas.tsv"
+    resources:
+        runtime=minutes_of_kappas,
     params:
         n_spo=setting("kappas.n_spo"),
         kappas=kappas,

@@ -18,6 +18,8 @@ rule detect_variant:
         f"{LOGS}/benchmarks/detect_variant/{{variant}}.tsv"
     wildcard_constraints:
         variant=one_of(sorted({run_of_variant(name) for name in VARIANTS})),
+    resources:
+        runtime=minutes_of_variant,
     params:
         n_spo=setting("samplings.n_spo"),
         sigma_min=setting("detector.sigma_min"),

@@ -22,6 +22,9 @@ rule scale_space:
         f"{LOGS}/benchmarks/scale_space/n{{n_spo}}.tsv"
     wildcard_constraints:
         n_spo=one_of(KEPT),
+    resources:
+        runtime=minutes_of_view,
+        mem_mb=memory_of_store,
     params:
         sigma_min=setting("detector.sigma_min"),
         kappa=setting("detector.kappa"),
@@ -57,6 +60,9 @@ rule scale_spaces:
         f"{LOGS}/scale_spaces/{{set}}_n{{n_spo}}.log",
     benchmark:
         f"{LOGS}/benchmarks/scale_spaces/{{set}}_n{{n_spo}}.tsv"
+    resources:
+        runtime=minutes_of_set,
+        mem_mb=memory_of_store,
     params:
         assumed_blur=assumed_blur_of_set,
         n_oct=setting("sets.{set}.n_oct"),

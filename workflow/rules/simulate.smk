@@ -9,7 +9,7 @@ every view of the set; write the store; seal it.
 rule simulate:
     """Simulate one set of views of the scene."""
     input:
-        reference=config["reference"],
+        reference=local(config["reference"]),
     output:
         store=directory(f"{RESULTS}/views/{{set}}"),
         digest=f"{RESULTS}/views/{{set}}.sha256",
@@ -17,6 +17,8 @@ rule simulate:
         f"{LOGS}/simulate/{{set}}.log",
     benchmark:
         f"{LOGS}/benchmarks/simulate/{{set}}.tsv"
+    resources:
+        mem_mb=memory_of_reference,
     params:
         reference_sha256=setting("reference_sha256"),
         reference_blur=setting("reference_blur"),

@@ -18,6 +18,8 @@ rule find_truth:
         f"{LOGS}/find_truth/view.log",
     benchmark:
         f"{LOGS}/benchmarks/find_truth/view.tsv"
+    resources:
+        runtime=minutes_of_truth,
     params:
         sigma_min=setting("detector.sigma_min"),
         sigma_max=end_of_truth,
@@ -59,7 +61,7 @@ use rule find_truth as find_truth_of_kappa with:
 rule find_scene:
     """Find the true extrema of the scene, as a view of the whole of it should see them."""
     input:
-        reference=config["reference"],
+        reference=local(config["reference"]),
         views=ancient(f"{RESULTS}/views/still"),
         digest=f"{RESULTS}/views/still.sha256",
     output:
@@ -68,6 +70,9 @@ rule find_scene:
         f"{LOGS}/find_scene.log",
     benchmark:
         f"{LOGS}/benchmarks/find_scene.tsv"
+    resources:
+        runtime=minutes_of_truth,
+        mem_mb=memory_of_reference,
     params:
         reference_blur=setting("reference_blur"),
         sigma_min=setting("detector.sigma_min"),
