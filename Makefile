@@ -13,7 +13,7 @@ OVERLAY = $(if $(WITH),--configfile $(WITH))
 QUICK = --configfile config/quick.yaml
 
 .DEFAULT_GOAL := help
-.PHONY: help study quick archive verify reference test bench check check-workflow format lock why clean environment test-slow FORCE
+.PHONY: help study quick archive verify reference test bench check check-workflow format lock why clean environment test-slow report FORCE
 
 help: ## List the targets
 	@echo "make study                  the whole study"
@@ -33,6 +33,9 @@ figures/quick/% results/quick/%: environment FORCE
 
 figures/% results/%: environment FORCE
 	$(SNAKEMAKE) $@ $(OVERLAY)
+
+report: study ## One HTML file with figures, verdicts, costs and provenance, after the study
+	python tools/report.py $(OVERLAY)
 
 why: environment ## What would run, and why (TARGET=figures/fig5.pdf: for one file)
 	@snakemake --dry-run $(TARGET) $(OVERLAY)

@@ -38,9 +38,10 @@ def new_project(folder: Path) -> Project:
 
 
 class Run:
-    """A run of the study in the background; nothing of it outlives the block."""
+    """A run of the study in the background; nothing of it outlives the block, unless it is let."""
 
     def __init__(self, project: Project, *arguments: str) -> None:
+        self.left = False
         self.output = project.folder / f"said-{time.monotonic_ns()}.txt"
         with self.output.open("w") as output:
             self.process = subprocess.Popen(
@@ -56,7 +57,8 @@ class Run:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.kill()
+        if not self.left:
+            self.kill()
 
     def kill(self) -> None:
         """End everything at once, as a power cut does."""
@@ -72,6 +74,7 @@ class Run:
             for process in (study, *children):
                 process.kill()
         self.process.wait()
+        self.left = True
 
     @property
     def said(self) -> str:

@@ -1,0 +1,62 @@
+"""The report of a run: one file with everything in it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+
+from project import QUICK, ROOT, Project
+
+CLAIM = {
+    "id": "a-claim",
+    "where": "section 1",
+    "statement": "Ratios are < 1 & more.",
+    "figure": "fig4",
+    "criterion": "ratio < 1",
+    "value": {"ratio": 0.5},
+    "interval": {"ratio": [0.25, 0.75]},
+    "paper": "small",
+    "verdict": "reproduced",
+    "note": "",
+}
+
+
+def report(project: Project) -> tuple[subprocess.CompletedProcess[str], str]:
+    shutil.copytree(ROOT / "tools", project.folder / "tools")
+    run = subprocess.run(
+        [sys.executable, "tools/report.py", *QUICK],
+        cwd=project.folder,
+        env=project.environment,
+        capture_output=True,
+        text=True,
+    )
+    page = project.folder / "results/quick/report.html"
+    return run, page.read_text() if page.exists() else ""
+
+
+def test_all_of_a_run_in_one_file(finished):
+    (finished.folder / "results/quick/claims.json").write_text(json.dumps([CLAIM]))
+    run, page = report(finished)
+    assert run.returncode == 0, run.stderr
+    loaded = re.findall(r'(?:src|srcset|<link[^>]*href)="([^"]*)"|url\(|@import|<script', page)
+    assert len(loaded) == 19 and all(source.startswith("data:image/png") for source in loaded)
+    anchors = set(re.findall(r'id="([^"]+)"', page))
+    links = re.findall(r'href="#([^"]+)"', page)
+    assert {"fig1", "figS4", "truth", "a-claim"} <= set(links) <= anchors
+    assert "Ratios are &lt; 1 &amp; more." in page and "ratio 0.5 (0.25 to 0.75)" in page
+    assert "Keypoints of 4 views that differ by random translations" in page  # quick.yaml's 4
+    assert "{{" not in page and "{%" not in page
+    drawn = set(re.findall(r"<text [^>]*>(\w+)</text>", page))
+    assert finished.would_run(*QUICK, "--forceall").keys() - {"all"} <= drawn
+
+
+def test_an_unfinished_run_has_no_report(finished):
+    (finished.folder / "figures/quick/fig4.png").unlink()
+    run, page = report(finished)
+    assert run.returncode != 0 and not page
+    assert run.stderr.splitlines() == [
+        "error: the study is not finished with these settings; run make study first"
+    ]

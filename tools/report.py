@@ -1,0 +1,184 @@
+"""Write the report of a finished run: one HTML file that needs no network.
+
+python tools/report.py [--configfile FILE]    after `make study`; `make report` does both
+
+It holds every figure with its caption, the verdicts on the paper's claims, what the jobs cost, what
+the results were made from, and the graph of the workflow, for a reader who has nothing else.
+Snakemake's own report has the same parts, but shows one figure at a time, without its caption, and
+a graph of sixty rules as arcs.
+"""
+
+from __future__ import annotations
+
+import ast
+import base64
+import csv
+import hashlib
+import importlib
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import jinja2
+import yaml
+from docutils.core import publish_parts
+from rule_graph import drawn, edges_of
+from snakemake.utils import update_config
+
+import keystab
+from keystab import settings
+from keystab.claims import VERDICTS
+from keystab.files import written_whole
+from keystab.fingerprint import fingerprint
+
+ROOT = Path(__file__).parents[1]
+PAGE = "page.html.jinja"
+
+
+def snakemake(*arguments: str) -> str:
+    """What Snakemake says when asked."""
+    command = [sys.executable, "-m", "snakemake", *arguments]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    if run.returncode:
+        sys.exit(run.stderr)
+    return run.stdout + run.stderr
+
+
+def complete_settings(overlays: list[str]) -> dict[str, Any]:
+    """Settings of the run, as the rules see them."""
+    given: dict[str, Any] = {}
+    for name in ["config/config.yaml", *overlays]:
+        update_config(given, yaml.safe_load((ROOT / name).read_text()))
+    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+    return settings.checked(given, schema)
+
+
+def caption(name: str, config: dict[str, Any]) -> str:
+    """Caption of a figure in HTML, with the values of the settings."""
+    text = (ROOT / f"workflow/report/{name}.rst").read_text()
+    filled = jinja2.Template(text).render(snakemake=SimpleNamespace(config=config))
+    return str(publish_parts(filled, writer="html5")["body"])
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def figure(name: str, config: dict[str, Any]) -> dict[str, Any]:
+    """All that the page says about a figure."""
+    module = importlib.import_module(f"keystab.figures.{name.lower()}")
+    tables = [ROOT / config["results"] / "tables" / table for table in module.TABLES]
+    png = ROOT / config["figures"] / f"{name}.png"
+    return {
+        "name": name,
+        "title": (module.__doc__ or name).splitlines()[0].rstrip("."),
+        "png": base64.b64encode(png.read_bytes()).decode(),
+        "caption": caption(name, config),
+        "code": fingerprint(module.__name__),
+        "tables": [(table.name, digest(table)) for table in tables],
+        "command": f"make {config['figures']}/{name}.pdf",
+    }
+
+
+def claims(config: dict[str, Any]) -> list[dict[str, Any]]:
+    """The ledger, verdict by verdict."""
+    ledger = json.loads((ROOT / config["results"] / "claims.json").read_text())
+    return sorted(ledger, key=lambda claim: list(VERDICTS).index(claim["verdict"]))
+
+
+def numbers(claim: dict[str, Any]) -> list[str]:
+    """Numbers of a claim, with their intervals."""
+    lines = []
+    for name, value in claim["value"].items():
+        line = f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
+        if interval := claim["interval"].get(name):
+            line += " ({:.3g} to {:.3g})".format(*interval)
+        lines.append(line)
+    return lines
+
+
+def costs(logs: Path) -> list[dict[str, Any]]:
+    """Jobs, seconds and largest memory of every rule, from the benchmark records."""
+    rules: dict[str, list[dict[str, str]]] = {}
+    for record in sorted((logs / "benchmarks").rglob("*.tsv")):
+        name = record.relative_to(logs / "benchmarks").parts[0].removesuffix(".tsv")
+        with record.open() as lines:
+            rules.setdefault(name, []).extend(csv.DictReader(lines, delimiter="\t"))
+    rows = [
+        {
+            "rule": name,
+            "jobs": len(records),
+            "seconds": sum(float(record["s"]) for record in records),
+            "memory": max((number(record["max_rss"]) for record in records), default=0.0),
+        }
+        for name, records in rules.items()
+    ]
+    return sorted(rows, key=lambda row: -row["seconds"])
+
+
+def number(text: str) -> float:
+    """Number of a record; jobs that ended at once have none."""
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+def figures_of_study() -> list[str]:
+    """Names of the figures, in the order of the Snakefile."""
+    lines = [line for line in (ROOT / "Snakefile").read_text().splitlines() if "FIGURES" in line]
+    listed = [line.partition("= ")[2] for line in lines if line.startswith("FIGURES ")]
+    return [name for names in listed for name in ast.literal_eval(names)]
+
+
+def main(arguments: list[str]) -> int:
+    """Write {results}/report.html."""
+    overlays = [argument for argument in arguments if argument != "--configfile"]
+    given = ["--configfile", *overlays] if overlays else []
+    config = complete_settings(overlays)
+    if "Nothing to be done" not in snakemake("--dry-run", *given):
+        sys.exit("error: the study is not finished with these settings; run make study first")
+    graph = edges_of(snakemake(*given, "--rulegraph", "dot"))
+    ledger = claims(config)
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(ROOT / "workflow/report"), autoescape=True
+    )
+    environment.filters["numbers"] = numbers
+    html = environment.get_template(PAGE).render(
+        version=keystab.__version__,
+        draft=config["draft"],
+        figures=[figure(name, config) for name in figures_of_study()],
+        claims=ledger,
+        verdicts={name: sum(one["verdict"] == name for one in ledger) for name in VERDICTS},
+        graph=drawn(graph),
+        costs=costs(ROOT / config["logs"]),
+        machine=f"{os.cpu_count()} cores ({platform.machine()}), {platform.system()}, "
+        f"Python {platform.python_version()}",
+        made_from=[
+            ("settings, complete, as JSON", digest_of(config)),
+            ("environment.lock", digest(ROOT / "environment.lock")),
+            (config["reference"], digest(ROOT / config["reference"])),
+            ("config/claims.yaml", digest(ROOT / "config/claims.yaml")),
+        ],
+        settings=yaml.safe_dump(config, sort_keys=False, default_flow_style=None, width=100),
+    )
+    path = ROOT / config["results"] / "report.html"
+    with written_whole(path) as part:
+        part.write_text(html, encoding="utf-8")
+    print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1e6:.1f} MB; open it in any browser")
+    return 0
+
+
+def digest_of(config: dict[str, Any]) -> str:
+    """SHA-256 of the complete settings."""
+    return hashlib.sha256(json.dumps(config, sort_keys=True).encode()).hexdigest()
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
