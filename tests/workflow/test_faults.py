@@ -60,6 +60,11 @@ class Run:
         if not self.left:
             self.kill()
 
+    def wait_for_jobs(self) -> None:
+        """Wait until the first job has started, or the run has ended."""
+        while self.process.poll() is None and "\nJob " not in self.said:
+            time.sleep(0.05)
+
     def kill(self) -> None:
         """End everything at once, as a power cut does."""
         with contextlib.suppress(ProcessLookupError):
@@ -122,17 +127,18 @@ def kill_and_take_up(
 ) -> None:
     """Kill a run at random moments, taking it up each time; start over when it comes to its end.
 
-    Every other kill leaves the jobs that are at work, which then run on without Snakemake.
+    Every other kill leaves the jobs that are at work, which then run on without Snakemake. Every
+    fourth may come before there is a job.
     """
     moment = random.Random(4)
-    shortest = 2.0  # until then, Snakemake has not started
     copies = 0
     project = new_project(folder / "0")
     while kills:
-        wait = moment.uniform(shortest, longest)
         with Run(project, *arguments) as run:
+            if kills % 4:
+                run.wait_for_jobs()
             try:
-                status = run.process.wait(timeout=wait)
+                status = run.process.wait(timeout=moment.uniform(0, longest))
             except subprocess.TimeoutExpired:
                 kills -= 1
                 run.kill() if kills % 2 else run.kill_snakemake()
@@ -144,11 +150,12 @@ def kill_and_take_up(
         project = new_project(folder / str(copies))
     status, said = study(project, *arguments)
     assert status == 0, said
+    assert "The last run here was killed: removed its lock." in said
     assert results(project) == expected
 
 
 def test_two_kills(undisturbed, tmp_path):
-    kill_and_take_up(tmp_path, ONE_FIGURE, results(undisturbed), kills=2, longest=9)
+    kill_and_take_up(tmp_path, ONE_FIGURE, results(undisturbed), kills=2, longest=3)
 
 
 @pytest.mark.slow
