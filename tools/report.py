@@ -156,7 +156,7 @@ def main(arguments: list[str]) -> int:
         figures=[figure(name, config) for name in figures_of_study()],
         claims=ledger,
         verdicts={name: sum(one["verdict"] == name for one in ledger) for name in VERDICTS},
-        graph=drawn(graph),
+        graph=drawn(graph, {*figures_of_study(), "claims"}),
         costs=costs(ROOT / config["logs"]),
         machine=f"{os.cpu_count()} cores ({platform.machine()}), {platform.system()}, "
         f"Python {platform.python_version()}",

@@ -52,33 +52,34 @@ def without_detours(edges: Edges) -> Edges:
     return {(a, b) for a, b in edges if not any(b in beyond[c] for c in after[a] if c != b)}
 
 
-def column_of(rule: str) -> int:
-    """Column of a rule, by the first word of its name.
+def column_of(rule: str, last: set[str]) -> int:
+    """Column of a rule, by the first word of its name unless it is one of the last column.
 
     Examples
     --------
-    >>> [column_of(name) for name in ("simulate", "find_truth", "match_grid", "fig1", "floor")]
-    [0, 1, 2, 3, 3]
+    >>> [column_of(name, {"fig1"}) for name in ("simulate", "find_truth", "match_grid", "fig1")]
+    [0, 1, 2, 3]
     """
+    if rule in last:
+        return 3
     if rule.startswith(("simulate", "scale_space")):
         return 0
-    if rule.startswith(("detect", "find")):
-        return 1
-    figure = re.fullmatch(r"fig\w+|claims|floor|truth|refinement", rule)
-    return 3 if figure else 2
+    return 1 if rule.startswith(("detect", "find")) else 2
 
 
-def drawn(edges: Edges) -> str:
+def drawn(edges: Edges, last: set[str]) -> str:
     """The graph as an SVG element.
 
     Parameters
     ----------
     edges : set of pairs
         From `edges_of`.
+    last : set of str
+        Rules of the last column.
     """
     edges = without_detours(edges)
     rules = sorted({name for edge in edges for name in edge})
-    column = {name: column_of(name) for name in rules}
+    column = {name: column_of(name, last) for name in rules}
     place = _places(edges, column)
     height = TOP + ROW * max(place.values()) + ROW
     width = len(COLUMNS) * BOX + (len(COLUMNS) - 1) * GAP

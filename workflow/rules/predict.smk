@@ -21,6 +21,8 @@ rule simulate_picture:
         f"{LOGS}/benchmarks/simulate_picture/{{set}}.tsv"
     wildcard_constraints:
         set=one_of(PICTURES),
+    resources:
+        mem_mb=memory_of_reference,
     params:
         reference_sha256=setting("predictors.pictures.{set}.sha256"),
         blur=setting("sets.still.blur"),

@@ -292,7 +292,7 @@ PREDICTED_N_SPO = [
 
 def path_of_picture(wildcards):
     """File of a further picture."""
-    return config["predictors"]["pictures"][wildcards.set]["path"]
+    return local(config["predictors"]["pictures"][wildcards.set]["path"])
 
 
 def name_of_reference():
