@@ -204,13 +204,10 @@ def truncate(file: Path) -> None:
     os.truncate(file, file.stat().st_size // 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("damage", "line"),
-    [
-        (flip, "is damaged"),
-        pytest.param(truncate, "is damaged", marks=pytest.mark.slow),
-        pytest.param(Path.unlink, "is missing", marks=pytest.mark.slow),
-    ],
+    [(flip, "is damaged"), (truncate, "is damaged"), (Path.unlink, "is missing")],
 )
 def test_a_damaged_store_is_named_and_remade_when_deleted(again, damage, line):
     expected = results(again)
