@@ -13,7 +13,7 @@ OVERLAY = $(if $(WITH),--configfile $(WITH))
 QUICK = --configfile config/quick.yaml
 
 .DEFAULT_GOAL := help
-.PHONY: help study quick archive verify reference test bench check check-workflow format lock why clean environment test-slow report FORCE
+.PHONY: help study quick report archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
 
 help: ## List the targets
 	@echo "make study                  the whole study"
