@@ -37,8 +37,8 @@ figures/% results/%: environment FORCE
 report: study ## One HTML file with figures, verdicts, costs and provenance, after the study
 	python tools/report.py $(OVERLAY)
 
-why: environment ## What would run, and why (TARGET=figures/fig5.pdf: for one file)
-	@snakemake --dry-run $(TARGET) $(OVERLAY)
+why: environment ## What would run, why, and for how long (TARGET=figures/fig5.pdf: for one file)
+	@python tools/why.py $(TARGET) $(OVERLAY)
 
 test: environment ## All tests
 	pytest -n 2 -m "not slow"

@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+from keystab.fingerprint import folder_of_loops
+
 # Loops that numba has compiled are kept where the study keeps them.
-os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".snakemake" / "numba"))
+os.environ.setdefault("NUMBA_CACHE_DIR", str(folder_of_loops(Path(__file__).parents[1])))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -6,7 +6,9 @@ Compiling takes as long as a draft of all figures; the set-up does it so that no
 import os
 from pathlib import Path
 
-os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).parents[1] / ".snakemake" / "numba")
+from keystab.fingerprint import folder_of_loops
+
+os.environ["NUMBA_CACHE_DIR"] = str(folder_of_loops(Path(__file__).parents[1]))
 
 import numpy as np  # noqa: E402
 

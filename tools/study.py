@@ -128,6 +128,22 @@ def existing(folder: Path) -> Path:
     return folder if folder.exists() else existing(folder.absolute().parent)
 
 
+def wrong_file(arguments: list[str]) -> str:
+    """What is wrong with a file of settings among the arguments, which Snakemake would not say."""
+    from keystab.errors import InputError
+    from keystab.settings import read_yaml
+
+    for name in config_files(arguments):
+        if not Path(name).is_file():
+            return f"{name}: no such file of settings; check WITH="
+        try:
+            if not read_yaml(name):
+                return f"{name}: holds no settings; write lines such as 'draft: true'"
+        except InputError as problem:
+            return str(problem)
+    return ""
+
+
 def read_durations(path: Path = DURATIONS) -> dict[str, float]:
     """Seconds that jobs took, by what they say; empty if nothing was written down."""
     if not path.is_file():
@@ -149,9 +165,9 @@ def main(arguments: list[str]) -> int:
     record = None
     if arguments[:1] == ["--record"]:
         record, arguments = Path(arguments[1]), arguments[2:]
-    missing = [name for name in config_files(arguments) if not Path(name).is_file()]
-    if missing:
-        print(f"error: {missing[0]}: no such file of settings; check WITH=", file=sys.stderr)
+    wrong = wrong_file(arguments)
+    if wrong:
+        print(f"error: {wrong}", file=sys.stderr)
         return 2
     from interrupted import take_up, why_locked  # beside this file
 

@@ -11,8 +11,9 @@ import pandas as pd
 
 from keystab import checks, cosine
 from keystab.blobs import blob_image, dog_extremum_scale, laplacian_extremum_scale
-from keystab.detection import detect_keypoints
 from keystab.errors import InputError
+from keystab.refinement import refined_keypoints
+from keystab.view_detection import Detector, detect_in_view
 
 _HALF_WIDTH = 5.0
 """Half width of an image in standard deviations of its blob. At the scale of the extremum the
@@ -32,6 +33,63 @@ class _Way(NamedTuple):
     assumed_blur: float
 
 
+def detect_blobs(
+    blobs: Sequence[float],
+    kappa: float = 2 ** (1 / 3),
+    kappas: Sequence[float] = (2 ** (1 / 30), 2 ** (1 / 3), 2 ** (1 / 2)),
+    n_spo: Sequence[int] = (3, 15),
+    camera_blur: float = 0.8,
+    assumed_blurs: Sequence[float] = (0.5, 1.1),
+    sigma_min: float = 1.1,
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Detect blobs of many sizes in all ways that `blob_table` compares.
+
+    Parameters
+    ----------
+    blobs, kappa, kappas, n_spo, camera_blur, assumed_blurs, sigma_min
+        See `blob_table`.
+
+    Returns
+    -------
+    extrema, traces : pandas.DataFrame
+        See `keystab.view_detection.detect_in_view`; extrema also say of which ``blob`` they are
+        and how it was searched, ``kappa``, ``n_spo`` and ``assumed_blur``. ``keypoint`` in
+        `traces` is the row in `extrema`.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range.
+
+    Examples
+    --------
+    >>> extrema, traces = detect_blobs([3.0], kappas=[1.2], n_spo=[3], assumed_blurs=[])
+    >>> extrema["kappa"].unique().round(2).tolist()
+    [1.2, 1.26]
+    """
+    if len(blobs) == 0:
+        raise InputError("blobs: none were given; give standard deviations in pixels")
+    for blob in blobs:
+        checks.number("blobs", blob, above=0)
+    first = max(sigma_min, camera_blur, *assumed_blurs)
+    found, followed, n_found = [], [], 0
+    for blob in map(float, blobs):
+        image, _ = _image(blob, camera_blur)
+        ways = _ways(kappa, kappas, n_spo, camera_blur, assumed_blurs)
+        for ratio, n, assumed in dict.fromkeys(
+            (way.kappa, way.n_spo, way.assumed_blur) for way in ways if way.detection != "series"
+        ):
+            scale = float(dog_extremum_scale(blob, ratio, float(camera_blur), assumed))
+            detector = Detector(
+                assumed, n, sigma_min=first, kappa=ratio, n_oct=_octaves(scale, first, n)
+            )
+            extrema, traces = detect_in_view(image, detector)
+            found.append(extrema.assign(blob=blob, kappa=ratio, n_spo=n, assumed_blur=assumed))
+            followed.append(traces.assign(keypoint=traces["keypoint"] + n_found))
+            n_found += len(extrema)
+    return pd.concat(found, ignore_index=True), pd.concat(followed, ignore_index=True)
+
+
 def blob_table(
     blobs: Sequence[float],
     kappa: float = 2 ** (1 / 3),
@@ -42,6 +100,7 @@ def blob_table(
     sigma_min: float = 1.1,
     max_offset: float = 0.6,
     max_iterations: int = 2,
+    detections: tuple[pd.DataFrame, pd.DataFrame] | None = None,
 ) -> pd.DataFrame:
     """Detect blobs of many sizes, and compare the scales with the closed forms.
 
@@ -68,6 +127,8 @@ def blob_table(
         First scale in pixels, or the largest of the blurs where that is more.
     max_offset, max_iterations
         Of the refinement; see `keystab.detect_keypoints`.
+    detections : (pandas.DataFrame, pandas.DataFrame), optional
+        What `detect_blobs` returns for the same blobs and ways; found anew when omitted.
 
     Returns
     -------
@@ -94,54 +155,37 @@ def blob_table(
     1  laplacian    series    3.00      3.00
     2        dog  discrete    2.67      2.77
     """
-    if len(blobs) == 0:
-        raise InputError("blobs: none were given; give standard deviations in pixels")
-    for blob in blobs:
-        checks.number("blobs", blob, above=0)
-    finest = max(n_spo)
+    if detections is None:
+        detections = detect_blobs(
+            blobs, kappa, kappas, n_spo, camera_blur, assumed_blurs, sigma_min
+        )
+    found = {
+        "discrete": detections[0],
+        "refined": refined_keypoints(*detections, max_offset, max_iterations),
+    }
     right = float(camera_blur)
     first = max(sigma_min, right, *assumed_blurs)
-    ways = [_Way("operator", ratio, finest, "refined", right) for ratio in kappas]
-    ways += [_Way("operator", 1.0, 0, "series", right)]
-    ways += [
-        _Way("sampling", kappa, n, detection, right)
-        for n in n_spo
-        for detection in ("discrete", "refined")
-    ]
-    ways += [
-        _Way("assumed_blur", kappa, finest, "refined", assumed)
-        for assumed in sorted({right, *assumed_blurs})
-    ]
     rows = []
     for blob in map(float, blobs):
         image, centre = _image(blob, camera_blur)
-        # The same detector takes part in several experiments.
-        scales: dict[_Way, float] = {}
-        for way in ways:
+        for way in _ways(kappa, kappas, n_spo, camera_blur, assumed_blurs):
             series = way.detection == "series"
             theory = float(
                 laplacian_extremum_scale(blob, right)
                 if series
                 else dog_extremum_scale(blob, way.kappa, right, way.assumed_blur)
             )
-            same = way._replace(experiment="")
-            if same in scales:
-                pass
-            elif series:
-                scales[same] = laplacian_scale(image, (centre, centre), camera_blur, blob)
+            if series:
+                scale = laplacian_scale(image, (centre, centre), camera_blur, blob)
             else:
-                found = detect_keypoints(
-                    image,
-                    way.assumed_blur,
-                    way.n_spo,
-                    sigma_min=first,
-                    kappa=way.kappa,
-                    refine=way.detection == "refined",
-                    max_offset=max_offset,
-                    max_iterations=max_iterations,
-                    n_oct=_octaves(theory, first, way.n_spo),
+                table = found[way.detection]
+                own = (
+                    (table["blob"] == blob)
+                    & (table["kappa"] == way.kappa)
+                    & (table["n_spo"] == way.n_spo)
+                    & (table["assumed_blur"] == way.assumed_blur)
                 )
-                scales[same] = _scale_of_blob(found, centre)
+                scale = _scale_of_blob(table[own], centre)
             rows.append(
                 {
                     "experiment": way.experiment,
@@ -154,12 +198,34 @@ def blob_table(
                     "assumed_blur": float(way.assumed_blur),
                     "sigma_min": float(first),
                     "theory": theory,
-                    "detected": scales[same],
+                    "detected": scale,
                 }
             )
     table = pd.DataFrame(rows)
     table["error"] = table["detected"] / table["theory"] - 1
     return table
+
+
+def _ways(
+    kappa: float,
+    kappas: Sequence[float],
+    n_spo: Sequence[int],
+    camera_blur: float,
+    assumed_blurs: Sequence[float],
+) -> list[_Way]:
+    """Return all ways to find the scale of a blob; a detector takes part in several experiments."""
+    finest, right = max(n_spo), float(camera_blur)
+    ways = [_Way("operator", float(ratio), finest, "refined", right) for ratio in kappas]
+    ways += [_Way("operator", 1.0, 0, "series", right)]
+    ways += [
+        _Way("sampling", float(kappa), n, detection, right)
+        for n in n_spo
+        for detection in ("discrete", "refined")
+    ]
+    return ways + [
+        _Way("assumed_blur", float(kappa), finest, "refined", float(assumed))
+        for assumed in sorted({right, *assumed_blurs})
+    ]
 
 
 def laplacian_scale(

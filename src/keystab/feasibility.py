@@ -6,7 +6,9 @@ them before anything is computed.
 
 from __future__ import annotations
 
+import difflib
 import math
+import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -35,6 +37,9 @@ NEEDED_SETS = ("still", "examples")
 
 SEARCHED_SETS = ("translations", "zooms", "rotations", "shipped", "blur_errors")
 """Sets of views that are searched for keypoints."""
+
+ONCE_SEARCHED = {"shipped": "figure 7", "blur_errors": "figure S2"}
+"""Sets of them that are searched at one sampling, and what is made of them."""
 
 SWEPT_SETS = {
     "aliasing": ("figure 10", "blur"),
@@ -66,16 +71,39 @@ def require(settings: Settings, folder: Path | str = ".") -> None:
 
 def sweep_problems(settings: Settings) -> list[str]:
     """One line for every sweep that figures are made from and that does not fit them."""
-    problems = []
+    problems = [
+        f"sets.{name} has a sweep, allowed is none: figures are made from its views as one set"
+        for name in (*NEEDED_SETS, *SEARCHED_SETS)
+        if settings["sets"].get(name, {}).get("sweep")
+    ]
     for name, (figure, key) in SWEPT_SETS.items():
         views = settings["sets"].get(name, {})
         if list(views.get("sweep") or {}) != [key]:
-            problems.append(f"sets.{name} has no sweep of {key}; {figure} is made from it")
+            swept = " and ".join(views.get("sweep") or {}) or "nothing"
+            problems.append(
+                f"sets.{name}.sweep has {swept}, allowed is {key}: {figure} is made from it"
+            )
         elif len(views["n_spo"]) != 1:
             problems.append(
                 f"sets.{name}.n_spo is {views['n_spo']}, allowed is one sampling for {figure}"
             )
-    return problems
+    return problems or _octaves_problems(settings)
+
+
+def _octaves_problems(settings: Settings) -> list[str]:
+    """One line where no octave of `stability.starts` lies within those searched."""
+    starts = settings["stability"]["starts"]
+    for name in ("unknown_blur", "noise"):
+        views = settings["sets"][name]
+        own = views["sigma_min"]
+        sigma_min = settings["detector"]["sigma_min"] if own is None else own
+        last = sigma_min * 2 ** views["n_oct"] / 2
+        if starts[0] > last * (1 + 1e-9):
+            return [
+                f"stability.starts is {starts}, allowed is at least one of at most {last:g}: "
+                f"an octave from there must end within the {views['n_oct']} of sets.{name}"
+            ]
+    return []
 
 
 def setting_problems(settings: Settings) -> list[str]:
@@ -85,6 +113,7 @@ def setting_problems(settings: Settings) -> list[str]:
         for name in (*NEEDED_SETS, *SEARCHED_SETS)
         if name not in settings["sets"]
     ]
+    problems += _misspelt_sets(settings["sets"])
     for name, views in settings["sets"].items():
         try:
             per_view(views)
@@ -92,16 +121,20 @@ def setting_problems(settings: Settings) -> list[str]:
             problems.append(f"sets.{name} has {error}")
     if problems:
         return problems
-    if len(per_view(settings["sets"]["still"])["blur"]) != 1:
-        problems.append("sets.still has several views; figures 3 to 6 study a single one")
+    n_views = len(per_view(settings["sets"]["still"])["blur"])
+    if n_views != 1:
+        problems.append(
+            f"sets.still has {n_views} views, allowed is one: figures 3 to 6 study a single view"
+        )
     else:
         problems += _scale_below_blur(settings) or searched_problems(settings)
-    problems += [
-        f"floor.variants.{name}.set is {variant['set']}, allowed are sets of views: "
-        f"{', '.join(settings['sets'])}"
-        for name, variant in settings["floor"]["variants"].items()
-        if variant["set"] not in settings["sets"]
-    ]
+    for name, variant in settings["floor"]["variants"].items():
+        if variant["set"] not in settings["sets"]:
+            close = difflib.get_close_matches(variant["set"], settings["sets"], n=3, cutoff=0.0)
+            problems.append(
+                f"floor.variants.{name}.set is {variant['set']}, allowed are sets of views, "
+                f"such as {', '.join(close)}"
+            )
     problems += _order(settings["comparison"], "comparison", "unstable_below", "stable_above")
     if settings["comparison"]["last_scale"] is not None:
         problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")
@@ -119,7 +152,12 @@ def setting_problems(settings: Settings) -> list[str]:
             f"keep_scale_spaces has {', '.join(map(str, unknown))}, allowed are members of "
             f"samplings.n_spo = {available}"
         )
-    folders = [Path(settings[key]) for key in ("results", "figures", "logs")]
+    if settings["floor"]["settles_at"] > max(available):
+        problems.append(
+            f"floor.settles_at is {settings['floor']['settles_at']}, allowed is at most "
+            f"{max(available)}, the last of samplings.n_spo"
+        )
+    folders = [os.path.normpath(settings[key]) for key in ("results", "figures", "logs")]
     if len(set(folders)) < len(folders):
         problems.append("results, figures and logs name the same folder; give three")
     return problems
@@ -177,6 +215,21 @@ def further_picture_problems(settings: Settings, folder: Path) -> list[str]:
     return problems
 
 
+def _misspelt_sets(sets: Settings) -> list[str]:
+    """One line for every set that nothing uses and that is nearly called like one that is used."""
+    used = [*NEEDED_SETS, *SEARCHED_SETS, *SWEPT_SETS]
+    members = [name for name in sets if name.rpartition("_")[0] in SWEPT_SETS]
+    problems = []
+    for name in sets:
+        close = difflib.get_close_matches(name, used, n=1, cutoff=0.8)
+        if close and name not in used and name not in members:
+            problems.append(
+                f"sets.{name} is no set that figures are made from; did you mean "
+                f"sets.{close[0]}? Give another set a name that is less alike"
+            )
+    return problems
+
+
 def _order(block: Settings, name: str, lower: str, upper: str) -> list[str]:
     if block[lower] < block[upper]:
         return []
@@ -208,11 +261,17 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
         shape = picture_shape(folder / settings["reference"])
     except InputError as error:
         return [f"reference: {error}"]
+    border = settings["comparison"]["border"]
     problems = [
         line
         for name, views in settings["sets"].items()
-        for line in fit_problems(name, views, shape, settings["comparison"]["border"])
-    ] + further_picture_problems(settings, folder)
+        for line in fit_problems(name, views, shape, border)
+    ]
+    if len(problems) == len(settings["sets"]):  # not the sets are to blame
+        of_border = _border_problems(settings["sets"], shape, border)
+        if of_border:
+            return of_border
+    problems += further_picture_problems(settings, folder)
     if problems:
         return problems
     problems = [
@@ -248,18 +307,42 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
     return []
 
 
+def _border_problems(sets: Settings, shape: tuple[int, int], border: float) -> list[str]:
+    """One line where the border leaves nothing of any view, which a usual one would not."""
+    sides = {
+        name: min(min(sides) for sides in view_shapes(views, shape)) - 2 * views["guard"]
+        for name, views in sets.items()
+    }
+    smallest = min(sides, key=lambda name: sides[name])
+    most = (sides[smallest] - 3) // 2
+    if most < min(border, 3):
+        return []
+    return [
+        f"comparison.border is {border:g}, allowed is at most {most}: the views of "
+        f"sets.{smallest} have a side of {sides[smallest]} px"
+    ]
+
+
 def searched_problems(settings: Settings) -> list[str]:
     """One line for every set of views that cannot be searched and compared as the figures need."""
     problems = []
     curves = settings["stability"]["curve_n_spo"]
     sigma_min = settings["detector"]["sigma_min"]
+    compared = [settings["sets"][name]["n_spo"] for name in ("translations", "zooms", "rotations")]
+    shared = sorted(set(compared[0]).intersection(*compared))
+    if all(compared) and set(curves) - set(shared):
+        problems.append(
+            f"stability.curve_n_spo is {curves}, allowed are members of n_spo of "
+            f"sets.translations, sets.zooms and sets.rotations, which share {shared}"
+        )
+    problems += _assumed_blur_problems(settings)
     for name, views in settings["sets"].items():
         if name in SEARCHED_SETS and not views["n_spo"]:
             problems.append(f"sets.{name}.n_spo is empty; give the scales per octave of a sampling")
-        elif name in ("translations", "zooms", "rotations") and set(curves) - set(views["n_spo"]):
+        elif name in ONCE_SEARCHED and len(views["n_spo"]) > 1:
             problems.append(
-                f"stability.curve_n_spo is {curves}, allowed are members of sets.{name}.n_spo = "
-                f"{views['n_spo']}"
+                f"sets.{name}.n_spo is {views['n_spo']}, allowed is one sampling for "
+                f"{ONCE_SEARCHED[name]}"
             )
         if not views["n_spo"]:
             continue
@@ -280,6 +363,19 @@ def searched_problems(settings: Settings) -> list[str]:
                 f"{max(blurs):g}, the blur that its views already have"
             )
     return problems
+
+
+def _assumed_blur_problems(settings: Settings) -> list[str]:
+    """One line where the view of the assumed blur, the measure of figure S2, is not the first."""
+    views = settings["sets"]["blur_errors"]
+    first = per_view(views)["blur"][0]
+    if views["assumed_blur"] == first:
+        return []
+    given = "empty" if views["assumed_blur"] is None else views["assumed_blur"]
+    return [
+        f"sets.blur_errors.assumed_blur is {given}, allowed is {first:g}, the blur of its first "
+        "view: figure S2 compares the others with that one"
+    ]
 
 
 def common_problems(

@@ -3,19 +3,24 @@
 Snakemake reruns a rule when its command or a parameter changes, but does not see an edit of the
 library behind the command. Every rule therefore carries the fingerprint of its stage as a
 parameter: it changes when the code of the stage or of any room that the stage imports changes,
-and stays the same under edits of comments, docstrings and layout. Only the standard library is
-used, because the Snakefile computes all fingerprints at every start.
+and stays the same under edits of comments, docstrings and layout. Of a catalogue, as the palette of
+the figures is one, only the entries count that are used. Only the standard library is used, because
+the Snakefile computes all fingerprints at every start.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 PACKAGE_FOLDER = Path(__file__).parent
+
+CATALOGUES = ("figures.palette",)
+"""Modules, without the package's name, that hold entries for others: each counts for itself."""
 
 
 class _Code(NamedTuple):
@@ -23,6 +28,15 @@ class _Code(NamedTuple):
 
     digest: str
     imports: tuple[str, ...]
+    entries: frozenset[tuple[str, str]]
+    """Catalogues and the names that are used of them."""
+
+
+class _Entry(NamedTuple):
+    """One definition of a catalogue: the digest of its code and the names that it uses."""
+
+    digest: str
+    names: frozenset[str]
 
 
 def fingerprint(module: str, package_folder: Path = PACKAGE_FOLDER) -> str:
@@ -43,8 +57,8 @@ def fingerprint(module: str, package_folder: Path = PACKAGE_FOLDER) -> str:
     Raises
     ------
     ValueError
-        If an import inside the package cannot be followed, because then an edit behind it would
-        go unseen.
+        If an import inside the package cannot be followed, or the use of a catalogue, because then
+        an edit behind it would go unseen.
 
     Notes
     -----
@@ -58,8 +72,16 @@ def fingerprint(module: str, package_folder: Path = PACKAGE_FOLDER) -> str:
     True
     """
     digest = hashlib.sha256()
-    for name in imported_modules(module, package_folder):
-        digest.update(f"{name} {_read(name, package_folder).digest}\n".encode())
+    names = imported_modules(module, package_folder)
+    used = {entry for name in names for entry in _read(name, package_folder).entries}
+    for name in names:
+        if name in _catalogues(package_folder) and name != module:
+            own = _digest_of_entries(
+                name, {entry for where, entry in used if where == name}, package_folder
+            )
+        else:
+            own = _read(name, package_folder).digest
+        digest.update(f"{name} {own}\n".encode())
     return digest.hexdigest()
 
 
@@ -79,6 +101,33 @@ def imported_modules(module: str, package_folder: Path = PACKAGE_FOLDER) -> list
             seen.add(name)
             waiting.extend(_read(name, package_folder).imports)
     return sorted(seen)
+
+
+def folder_of_loops(project: Path, package_folder: Path = PACKAGE_FOLDER) -> Path:
+    """Folder for the loops that numba compiles from the code as it is.
+
+    numba compiles a loop again when its own file changes, but not when a loop that it calls in
+    another file does. Other code therefore gets another folder.
+
+    Parameters
+    ----------
+    project : Path
+        Folder of the project.
+    package_folder : Path
+        Folder of the package.
+
+    Examples
+    --------
+    >>> folder_of_loops(Path("project")).parent.as_posix()
+    'project/.snakemake/numba'
+    """
+    digest = hashlib.sha256()
+    for path in sorted(package_folder.glob("*.py")):
+        if b"\nfrom numba import" in path.read_bytes():
+            digest.update(
+                fingerprint(f"{package_folder.name}.{path.stem}", package_folder).encode()
+            )
+    return project / ".snakemake" / "numba" / digest.hexdigest()[:12]
 
 
 def _file_of(module: str, package_folder: Path) -> Path | None:
@@ -101,9 +150,111 @@ def _read(module: str, package_folder: Path) -> _Code:
     tree = ast.parse(path.read_bytes(), filename=str(path))
     is_package = path.name == "__init__.py"
     imports = _imports(tree, module, is_package, package_folder)
+    entries = frozenset(
+        (name, entry)
+        for name in _catalogues(package_folder)
+        if name in imports and name != module
+        for entry in _entries_used(tree, module, is_package, name)
+    )
+    return _Code(_digest([tree]), imports, entries)
+
+
+def _digest(nodes: Sequence[ast.AST]) -> str:
     tokens: list[str] = []
-    _spell(tree, tokens)
-    return _Code(hashlib.sha256("\x1f".join(tokens).encode()).hexdigest(), imports)
+    for node in nodes:
+        _spell(node, tokens)
+    return hashlib.sha256("\x1f".join(tokens).encode()).hexdigest()
+
+
+# ---------------------------------------------------------------------------------------------
+# Catalogues
+
+
+def _catalogues(package_folder: Path) -> list[str]:
+    return [f"{package_folder.name}.{name}" for name in CATALOGUES]
+
+
+def _digest_of_entries(catalogue: str, names: set[str], package_folder: Path) -> str:
+    """Digest of some entries of a catalogue and of those that these use in turn."""
+    entries = _read_catalogue(catalogue, package_folder)
+    seen: set[str] = set()
+    waiting = sorted(names)
+    while waiting:
+        name = waiting.pop()
+        if name not in entries:
+            raise ValueError(f"{catalogue} has no {name}, which is used")
+        if name not in seen:
+            seen.add(name)
+            waiting.extend(entries[name].names & entries.keys())
+    return " ".join(f"{name} {entries[name].digest}" for name in sorted({*seen, ""}))
+
+
+@cache
+def _read_catalogue(module: str, package_folder: Path) -> dict[str, _Entry]:
+    """Definitions of a catalogue by their names; imports, which all share, under the name ""."""
+    path = _file_of(module, package_folder)
+    assert path is not None
+    shared: list[ast.AST] = []
+    entries: dict[str, _Entry] = {}
+    for statement in ast.parse(path.read_bytes(), filename=str(path)).body:
+        if _is_text(statement):
+            continue
+        if isinstance(statement, (ast.Import, ast.ImportFrom, ast.If)):
+            shared.append(statement)
+            continue
+        if isinstance(statement, ast.FunctionDef):
+            defined = [statement.name]
+        elif isinstance(statement, (ast.Assign, ast.AnnAssign)):
+            places = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+            targets = [node for target in places for node in ast.walk(target)]
+            defined = [node.id for node in targets if isinstance(node, ast.Name)]
+        else:
+            raise ValueError(
+                f"{module}, line {statement.lineno}: a catalogue holds imports, constants and "
+                "functions, nothing else"
+            )
+        used = frozenset(node.id for node in ast.walk(statement) if isinstance(node, ast.Name))
+        if used & {"globals", "locals", "vars"}:
+            raise ValueError(f"{module}: {defined[0]} must name the entries that it uses")
+        for name in defined:
+            if name in entries:
+                raise ValueError(f"{module} defines {name} twice: give one of them another name")
+            entries[name] = _Entry(_digest([statement]), used)
+    return {**entries, "": _Entry(_digest(shared), frozenset())}
+
+
+def _entries_used(tree: ast.Module, module: str, is_package: bool, catalogue: str) -> set[str]:
+    """Names that a module uses of a catalogue."""
+    parent, _, last = catalogue.rpartition(".")
+    aliases: set[str] = set()
+    used: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import) and any(alias.name == catalogue for alias in node.names):
+            raise ValueError(f"{module} says 'import {catalogue}': write 'from {parent} import'")
+        if isinstance(node, ast.ImportFrom):
+            base = _absolute(node, module, is_package)
+            if base == parent:
+                aliases |= {one.asname or one.name for one in node.names if one.name == last}
+            elif base == catalogue:
+                used |= {one.name for one in node.names}
+    attributes = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id in aliases
+    ]
+    n_names = sum(isinstance(node, ast.Name) and node.id in aliases for node in ast.walk(tree))
+    if n_names != len(attributes) or "*" in used:
+        raise ValueError(
+            f"{module} uses {catalogue} as a whole: take its entries by their names, as in "
+            f"{last}.NAME, so that the others need not count"
+        )
+    return used | {node.attr for node in attributes}
+
+
+# ---------------------------------------------------------------------------------------------
+# Imports and code
 
 
 def _imports(
@@ -213,8 +364,8 @@ def _spell(node: ast.AST, tokens: list[str]) -> None:
     tokens.append(type(node).__name__)
     for field in node._fields:
         value: Any = getattr(node, field, None)
-        if field == "body" and _has_docstring(node):
-            value = value[1:]
+        if field in ("body", "orelse", "finalbody") and isinstance(value, list):
+            value = [statement for statement in value if not _is_text(statement)]
         if value is None or value == [] or field == "kind":
             continue
         tokens.append(field)
@@ -231,12 +382,10 @@ def _spell(node: ast.AST, tokens: list[str]) -> None:
             tokens.append(repr(value))
 
 
-def _has_docstring(node: ast.AST) -> bool:
-    if not isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
-        return False
-    first = node.body[0] if node.body else None
+def _is_text(statement: ast.AST) -> bool:
+    """Whether a statement is nothing but a text: the docstring of something, without effect."""
     return (
-        isinstance(first, ast.Expr)
-        and isinstance(first.value, ast.Constant)
-        and isinstance(first.value.value, str)
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
     )

@@ -226,6 +226,8 @@ def _head(path: Path) -> bytes:
             head = file.read(26)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; give the path of a {_READABLE} picture") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; give the path of a {_READABLE} picture") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be opened ({error.strerror})") from None
     depth, colour_type = head[24:25], head[25:26]

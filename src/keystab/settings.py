@@ -119,6 +119,12 @@ def completed(given: Any, schema: Schema) -> Any:
     >>> schema = {"type": "object", "properties": {"a": {"default": 1}, "b": {"default": 2}}}
     >>> completed({"b": 5}, schema)
     {'a': 1, 'b': 5}
+
+    Entries with names of the reader's own come in the order of the default, then as given:
+
+    >>> named = {"type": "object", "default": {"x": 1, "y": 2}, "additionalProperties": {}}
+    >>> completed({"z": 6, "y": 5, "x": 4}, named)
+    {'x': 4, 'y': 5, 'z': 6}
     """
     if schema.get("type") != "object":
         return copy.deepcopy(given)
@@ -127,7 +133,8 @@ def completed(given: Any, schema: Schema) -> Any:
         for key, part in schema.get("properties", {}).items()
     }
     others = schema.get("additionalProperties", False)
-    for key in given:
+    # Snakemake puts what an overlay names first; the order must not depend on who names it.
+    for key in [*(key for key in schema.get("default", {}) if key in given), *given]:
         if key not in filled and isinstance(others, Mapping):
             filled[key] = completed(given[key], others)
     return filled
@@ -181,6 +188,11 @@ def _explain(error: jsonschema.ValidationError) -> Iterator[tuple[str, str]]:
         for key in value:
             if key not in schema.get("properties", {}):
                 yield _join(place, key), _unknown(place, key, known)
+    elif error.validator in ("minProperties", "maxProperties"):
+        known = list(schema["properties"])
+        if set(value) <= set(known):  # else they are named as unknown settings
+            given = " and ".join(value) or "nothing"
+            yield place, f"{place} has {given}, allowed is one of {', '.join(known)}"
     elif error.validator == "propertyNames" or "propertyNames" in error.absolute_schema_path:
         yield (
             f"{place}:{value}",
@@ -233,7 +245,7 @@ def allowed(schema: Schema) -> str:
     'a whole number of at least 1 or null'
     """
     if "enum" in schema:
-        return " or ".join(str(value) for value in schema["enum"])
+        return " or ".join("null" if value is None else str(value) for value in schema["enum"])
     types = schema.get("type", [])
     return " or ".join(
         _allowed_type(kind, schema) for kind in ([types] if isinstance(types, str) else types)
@@ -256,8 +268,10 @@ def _allowed_type(kind: str, schema: Schema) -> str:
         return " ".join([name, " and ".join(bounds)]).strip()
     if kind == "array":
         order = ", smallest first, none twice" if schema.get("increasing") else ""
-        least = max(1, schema.get("minItems", 0)) if "minItems" in schema else 0
+        least, most = schema.get("minItems", 0), schema.get("maxItems")
         count = f" with at least {least} items" if least > 1 else " [a, b, ...]"
+        if most is not None:
+            count = f" of {most} items"
         return f"a list{count}, each {allowed(schema['items'])}{order}"
     if kind == "string" and "pattern" in schema:
         return "64 hexadecimal digits" if "0-9a-f" in schema["pattern"] else "a name"

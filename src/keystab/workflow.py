@@ -16,6 +16,7 @@ from pathlib import Path
 import yaml
 
 from keystab.errors import InputError
+from keystab.fingerprint import folder_of_loops
 from keystab.settings import Settings, checked, read_yaml
 
 __all__ = ["Output", "Study", "find_project"]
@@ -23,7 +24,7 @@ __all__ = ["Output", "Study", "find_project"]
 _FOLDERS = ("results", "figures", "logs")
 _JOB = re.compile(r"^Job \d+: (.*)\n *[Rr]eason: (.*)$", re.MULTILINE)
 _FOLLOWS = ("Input files updated by another job", "Missing output files")
-_DIGEST = re.compile("'[0-9a-f]{64}'")  # settings have names, see common.smk
+_DIGEST = re.compile(r"(?:code of [\w.]+ = |environment\.lock = |')[0-9a-f]{64}'?")  # common.smk
 _LONG = re.compile("Union of exclusive params before and now across all output: ")
 
 
@@ -182,7 +183,7 @@ def _environment() -> dict[str, str]:
     library = Path(__file__).parents[1]
     paths = [str(Path(sys.executable).parent), os.environ.get("PATH", "")]
     return {
-        "NUMBA_CACHE_DIR": str(library.parent / ".snakemake/numba"),
+        "NUMBA_CACHE_DIR": str(folder_of_loops(library.parent)),
         **os.environ,
         "PYTHONPATH": str(library),
         "PATH": os.pathsep.join(paths),

@@ -19,6 +19,8 @@ from keystab.blobs import (
     variance_at_zero,
 )
 from keystab.errors import InputError
+from keystab.stages import detect_blobs, match_blobs
+from keystab.tables import read_table
 
 sizes, ratios, blurs = st.floats(1.5, 8.0), st.floats(1.01, 2.0), st.floats(0.0, 0.9)
 
@@ -169,3 +171,27 @@ def test_wrong_arguments_are_named(call, words):
     with pytest.raises(InputError, match=words) as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+def test_detections_serve_every_limit_of_the_refinement(tmp_path):
+    ways = [
+        *("--size-from", "1.5", "--size-to", "3", "--size-count", "2", "--kappas", "1.2"),
+        *("--n-spo", "3", "--camera-blur", "0.8", "--assumed-blurs", "0.5"),
+        *("--sigma-min", "1.1", "--kappa", "1.25"),
+        *("--extrema", str(tmp_path / "extrema.parquet")),
+        *("--traces", str(tmp_path / "traces.parquet")),
+    ]
+    assert detect_blobs.main(ways) == 0
+    for max_offset, max_iterations in ((0.6, 2), (0.3, 1)):
+        limits = ["--max-offset", str(max_offset), "--max-iterations", str(max_iterations)]
+        assert match_blobs.main([*ways, *limits, "--table", str(tmp_path / "table.csv")]) == 0
+        anew = blob_table(
+            [1.5, 3.0],
+            kappa=1.25,
+            kappas=[1.2],
+            n_spo=[3],
+            assumed_blurs=[0.5],
+            max_offset=max_offset,
+            max_iterations=max_iterations,
+        )
+        assert read_table(tmp_path / "table.csv").equals(anew)

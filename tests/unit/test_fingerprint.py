@@ -91,9 +91,11 @@ def test_other_edits_keep_it(toy, name, old, new):
     assert taken(toy) == before
 
 
-def test_strings_that_are_no_docstrings_count(toy):
+def test_texts_that_explain_constants_do_not_count_and_those_that_are_used_do(toy):
     before = taken(toy)
-    (toy / "late.py").write_text('LIMIT = 3\n"""A string after the first statement."""\n')
+    (toy / "late.py").write_text('LIMIT = 3\n"""Largest number of tries."""\n')
+    assert taken(toy) == before
+    (toy / "late.py").write_text('LIMIT = 3\nWORDS = "Largest number of tries."\n')
     assert taken(toy) != before
 
 
@@ -111,6 +113,73 @@ def test_name_taken_from_the_package_brings_its_code_in(toy):
     before = taken(toy)
     (toy / "__init__.py").write_text('__version__ = "2"\n')
     assert taken(toy) != before
+
+
+PALETTE = """\
+from math import pi
+INK = "#222"
+LINES = {"a": "#111", "b": INK}
+_SHADES = ("#000", "#fff")
+def shade(share):
+    return _SHADES[0] if share < pi else LINES["a"]
+"""
+
+
+@pytest.fixture
+def painted(toy: Path) -> Path:
+    (toy / "figures").mkdir()
+    (toy / "figures/__init__.py").write_text("")
+    (toy / "figures/palette.py").write_text(PALETTE)
+    (toy / "figures/ink.py").write_text("from toy.figures import palette\nC = palette.INK\n")
+    (toy / "figures/shades.py").write_text("from toy.figures.palette import shade as tone\n")
+    return toy
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "changed"),
+    [
+        ("#222", "#333", {"ink", "shades"}),  # LINES, which shade needs, uses it
+        ("#fff", "#eee", {"shades"}),
+        ("< pi", "<= pi", {"shades"}),
+        ("import pi", "import tau as pi", {"ink", "shades"}),  # runs for all
+        ('INK = "#222"', 'INK = "#222"  # nearly black\n"""Text."""\nMORE = 1', set()),
+    ],
+)
+def test_a_colour_counts_for_the_figures_that_use_it(painted, old, new, changed):
+    before = {name: taken(painted, f"toy.figures.{name}") for name in ("ink", "shades")}
+    assert old in PALETTE
+    (painted / "figures/palette.py").write_text(PALETTE.replace(old, new))
+    room._read_catalogue.cache_clear()
+    after = {name: taken(painted, f"toy.figures.{name}") for name in before}
+    assert {name for name in before if before[name] != after[name]} == changed
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("ink.py", "from toy.figures import palette\nC = getattr(palette, 'INK')\n", "as a whole"),
+        ("ink.py", "from toy.figures.palette import *\n", "as a whole"),
+        ("ink.py", "import toy.figures.palette\n", "says 'import toy.figures.palette'"),
+        ("ink.py", "from toy.figures import palette\nC = palette.NONE\n", "has no NONE"),
+        ("palette.py", "INK = 1\nprint(INK)\n", "holds imports, constants and functions"),
+        ("palette.py", "INK = 1\nINK = 2\n", "defines INK twice"),
+        ("palette.py", "INK = vars()\n", "must name the entries"),
+    ],
+)
+def test_uses_of_a_catalogue_that_cannot_be_followed_are_refused(painted, name, text, said):
+    (painted / "figures" / name).write_text(text)
+    room._read_catalogue.cache_clear()
+    with pytest.raises(ValueError, match=said):
+        taken(painted, "toy.figures.ink")
+
+
+def test_compiled_loops_are_kept_apart_for_other_code_of_what_they_call(toy):
+    (toy / "loops.py").write_text("\nfrom numba import njit\nfrom toy.base import double\n")
+    room._read.cache_clear()
+    before = room.folder_of_loops(toy, toy)
+    (toy / "base.py").write_text(FILES["base.py"].replace("2 * x", "3 * x"))
+    room._read.cache_clear()
+    assert room.folder_of_loops(toy, toy) != before
 
 
 def test_every_stage_and_figure_of_the_study_can_be_followed():

@@ -144,7 +144,7 @@ def refuse_16_bit_colour(path):
     ("name", "make", "words"),
     [
         ("gone.png", lambda p: None, "no such file"),
-        ("folder.png", lambda p: p.mkdir(), "cannot be opened"),
+        ("folder.png", lambda p: p.mkdir(), "is a folder; give the path"),
         ("text.png", lambda p: p.write_text("hello"), NO_FORMAT),
         ("empty.png", lambda p: p.write_bytes(b""), NO_FORMAT),
         ("cut.png", lambda p: cut(p), "not a readable picture"),
@@ -232,6 +232,7 @@ def test_shape_of_colour_and_what_has_none(tmp_path):
         ("moving.gif", "2 pictures"),
         ("text.tif", NO_FORMAT),
         ("gone.png", "no such file; give the path of a PNG, JPEG, TIFF or .npy picture"),
+        ("", "is a folder; give the path of a PNG, JPEG, TIFF or .npy picture"),
     ):
         with pytest.raises(InputError) as raised:
             picture_shape(tmp_path / name)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-TOOL = runpy.run_path(str(Path(__file__).parents[2] / "tools/study.py"))
+TOOLS = Path(__file__).parents[2] / "tools"
+TOOL = runpy.run_path(str(TOOLS / "study.py"))
 Clock, jobs_of, in_words = (TOOL[name] for name in ("Clock", "jobs_of", "in_words"))
 
 DETECT = "Detecting extrema in the views '{}' at n_spo = {}"
@@ -65,7 +66,22 @@ def test_durations_survive_writing(tmp_path):
     assert TOOL["read_durations"](tmp_path / "none.csv") == {}
 
 
-def test_missing_settings_get_one_line(capsys):
-    assert TOOL["main"](["--cores", "1", "--configfile", "nowhere.yaml"]) == 2
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (None, "no such file of settings; check WITH="),
+        ("detector: {kappa: 1.2\nrefinement: [}", "is not YAML in line 2: "),
+        ("detector:\n\tkappa: 1.2\n", "is not YAML in line 2: "),
+        ("- 1\n- 2\n", "holds no settings; write lines such as 'draft: true'"),
+        ("# draft: true\n", "holds no settings; write lines such as 'draft: true'"),
+    ],
+)
+@pytest.mark.parametrize("tool", ["study", "why"])
+def test_files_that_are_no_settings_get_one_line(capsys, tmp_path, tool, text, line):
+    path = tmp_path / "given.yaml"
+    if text is not None:
+        path.write_text(text)
+    main = runpy.run_path(str(TOOLS / f"{tool}.py"))["main"]
+    assert main(["--cores", "1", "--configfile", str(path)]) == 2
     said = capsys.readouterr().err
-    assert said == "error: nowhere.yaml: no such file of settings; check WITH=\n"
+    assert said.startswith(f"error: {path}: {line}") and said.count("\n") == 1

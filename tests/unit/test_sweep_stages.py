@@ -61,13 +61,21 @@ def matching(sets, folder, *more):
         *("--guard", "0", "--border", "3.0", "--first-scale", KAPPA, "--last-scale", "None"),
         *("--space-tolerance", "1.0", "--scale-ratio", "1.4142135623730951"),
         *("--match-sign", "False", "--max-offset", "0.6", "--max-iterations", "2"),
-        *("--seen-by", "0.7", "--n-resamples", "20", "--curves", str(folder / "curves.csv")),
+        *("--n-resamples", "20", "--curves", str(folder / "curves.csv")),
         *("--counts", str(folder / "counts.csv"), *more),
     ]
 
 
 def test_each_set_of_a_sweep_is_matched_within_itself(sets, tmp_path):
-    scales = ["--starts", "1.1", "2.2", "--scales", str(tmp_path / "scales.csv")]
+    scales = [
+        "--starts",
+        "1.1",
+        "2.2",
+        "--seen-by",
+        "0.7",
+        "--scales",
+        str(tmp_path / "scales.csv"),
+    ]
     assert match_sweep.main(matching(sets, tmp_path, *scales)) == 0
     counts, curves, table = (
         read_table(tmp_path / f"{name}.csv") for name in ("counts", "curves", "scales")
@@ -91,17 +99,20 @@ def test_each_set_of_a_sweep_is_matched_within_itself(sets, tmp_path):
 
 def test_curves_and_counts_are_the_same_without_scales(sets, tmp_path):
     (tmp_path / "with").mkdir()
-    scales = ["--starts", "1.1", "--scales", str(tmp_path / "scales.csv")]
+    scales = ["--starts", "1.1", "--seen-by", "0.7", "--scales", str(tmp_path / "scales.csv")]
     assert match_sweep.main(matching(sets, tmp_path / "with", *scales)) == 0
-    assert match_sweep.main(matching(sets, tmp_path, "--starts")) == 0
+    assert match_sweep.main(matching(sets, tmp_path)) == 0
     for name in ("curves.csv", "counts.csv"):
         assert (tmp_path / name).read_bytes() == (tmp_path / "with" / name).read_bytes()
 
 
-def test_starts_and_scales_go_together(sets, tmp_path, capsys):
+@pytest.mark.parametrize(
+    "given", [["--starts", "1.1"], ["--seen-by", "0.7"], ["--starts", "1.1", "--seen-by", "0.7"]]
+)
+def test_starts_and_scales_go_together(sets, tmp_path, capsys, given):
     with pytest.raises(SystemExit):
-        match_sweep.main(matching(sets, tmp_path, "--starts", "1.1"))
-    assert "--starts and --scales go together" in capsys.readouterr().err
+        match_sweep.main(matching(sets, tmp_path, *given))
+    assert "--starts, --seen-by and --scales go together" in capsys.readouterr().err
 
 
 def cropping(sets, folder, size):

@@ -19,9 +19,9 @@ AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
 AFTER_MATCHING |= {"judge_keypoints", "truth"} | PREDICTING
 SAMPLINGS = {"match_grid", "match_samplings", "match_picture", "fig3"} | AFTER_MATCHING
 VIEWS = {"match_views", "match_shipped", "fig7", "fig8", "figS1"}
-SWEEPS = {"match_sweep", "match_blurs", "fig10", "fig11", "fig12", "figS2"}
+SWEEPS = {"match_sweep", "match_aliasing", "match_blurs", "fig10", "fig11", "fig12", "figS2"}
 KAPPAS = {"match_kappas", "fig9"}
-BLOBS = {"detect_blobs", "figS4"}
+BLOBS = {"match_blobs", "figS4"}
 VARIANTS = {"match_variants", "floor"}
 MATCHING = SAMPLINGS | VIEWS | SWEEPS | KAPPAS | VARIANTS
 ACCEPTING = {"judge_samplings", "judge_cosine", "judge_kappas", "judge_views", "truth"}
@@ -39,7 +39,7 @@ STILL = (
 STILL = (STILL | TRUTHS | JUDGING | {"detect_cosine"}) - OF_PICTURES
 SIMULATION = STILL | DETECTION | TRUTHS | {"describe_views", "crop_views", "fig2"}
 SIMULATION |= {"simulate_picture"}
-THEORY = {"semigroup", "noise_theory", "camera_optics"} | BLOBS
+THEORY = {"semigroup", "noise_theory", "camera_optics", "detect_blobs"} | BLOBS
 EVERYTHING = SIMULATION | FIGURES | THEORY
 
 
@@ -60,12 +60,20 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
     [
         ("src/keystab/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
         ("src/keystab/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
-        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS),
+        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS | {"detect_blobs"}),
+        ("src/keystab/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "judge_keypoints", "truth"} | PREDICTING),
+        ("src/keystab/stages/cut_cubes.py", "    args = ", "    MORE = 1\n    args = ", {"cut_cubes", "fig6"}),
+        ("src/keystab/settings.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", set()),
+        ("src/keystab/figures/palette.py", '"condition": "#A8458A"', '"condition": "#A8458B"', {"fig5"}),
+        ("src/keystab/figures/palette.py", '"""Predictors of stability', '"""Features', set()),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
         ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", SIMULATION),
         ("workflow/report/fig3.rst", "", "A better caption. ", set()),
-        ("environment.lock", "numpy==", "# another numpy\nnumpy==", EVERYTHING),
+        ("workflow/rules/detect.smk", "rule detect:\n", "# a comment\nrule detect:\n", set()),
+        ("config/config.yaml", "detector:\n", "# a comment\ndetector:\n", set()),
+        ("config/claims.yaml", "- id:", "# a comment\n- id:", set()),
+        ("environment.lock", "numpy==", "numpy==99.", EVERYTHING),
     ],
 )  # fmt: skip
 def test_edits_of_code(finished, name, old, new, expected):
@@ -93,12 +101,15 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
+        ("comparison: {border: 3}", set()),  # 3.0
         ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS | BLOBS | ACCEPTING),
         ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "judge_grid", "detect_variant"} - VARIANTS - OF_PICTURES),
         ("comparison: {match_sign: true}", MATCHING),
         ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS | SWEEPS | VARIANTS),
         ("comparison: {scale_ratio: 1.5}", MATCHING | JUDGING),
-        ("stability: {seen_by: 0.6}", {"match_sweep", "fig10", "fig11", "fig12"}),
+        ("stability: {seen_by: 0.6}", {"match_sweep", "fig11", "fig12"}),
+        # The inputs stay the same, but others belong to this variant.
+        ("floor: {variants: {closer_1e6: {set: still}}}", VARIANTS),
         ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "judge_views", "truth"}),
         ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
         ("comparison: {stable_above: 0.9}", {"match_samplings", "match_picture"} | AFTER_MATCHING),
@@ -106,9 +117,9 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("predictors: {pictures: {stream: {step: 22}}}", OF_PICTURES | PREDICTING | {"simulate_picture"}),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
         ("optics: {defocus: 20.0}", {"camera_optics", "figS3"}),
-        ("blobs: {camera_blur: 0.7}", BLOBS),
+        ("blobs: {camera_blur: 0.7}", BLOBS | {"detect_blobs"}),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
-        ("stability: {n_resamples: 200}", VIEWS | {"match_sweep", "fig10", "fig11", "fig12"}),
+        ("stability: {n_resamples: 200}", VIEWS | {"match_sweep", "match_aliasing", "fig10", "fig11", "fig12"}),
         ("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7", "judge_refinement", "refinement"}),
         ("shipped: {contrast: 0.02}", {"match_shipped", "fig7"}),
         ("kappas: {fractions: [2, 3, 10]}", {"detect_kappas", "judge_kappas", "truth"} | KAPPAS),

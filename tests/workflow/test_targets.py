@@ -30,7 +30,7 @@ def test_whole_study_at_the_papers_settings(project):
     [
         ("figures/quick/fig1.pdf", {"semigroup", "fig1"}),
         ("figures/quick/figS3.pdf", {"camera_optics", "figS3"}),
-        ("figures/quick/figS4.png", {"detect_blobs", "figS4"}),
+        ("figures/quick/figS4.png", {"detect_blobs", "match_blobs", "figS4"}),
         ("figures/quick/fig2.png", {"simulate", "describe_views", "fig2"}),
         ("figures/quick/fig12.pdf", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12"}),
         ("figures/quick/figS2.pdf", {"simulate", "detect_views", "match_blurs", "figS2"}),
@@ -120,3 +120,4 @@ def test_settings_reach_rules_with_their_names(path: Path):
     # Plain values would be compared as a set, without names; see Named in common.smk.
     for block in re.findall(r"^    params:\n((?:        .*\n)+)", path.read_text(), re.M):
         assert "config[" not in block and "lookup(" not in block
+        assert "Named(" not in block  # a constant loses its name: fixed(...)

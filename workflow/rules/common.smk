@@ -19,15 +19,17 @@ from pathlib import Path
 import yaml
 
 from keystab import feasibility, ledgers, settings, view_sets
+from keystab import fingerprint as fingerprints
 from keystab.errors import InputError
-from keystab.fingerprint import fingerprint
 
 try:
     config.update(
         settings.checked(
             config,
-            yaml.safe_load(
-                Path(workflow.basedir, "workflow/schemas/config.schema.yaml").read_text()
+            # The compiled loader is ten times as fast.
+            yaml.load(
+                Path(workflow.basedir, "workflow/schemas/config.schema.yaml").read_text(),
+                Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader),
             ),
         )
     )
@@ -56,12 +58,15 @@ SEARCHED_SETS = [name for name, views in config["sets"].items() if views["n_spo"
 KEPT_SETS = SEARCHED_SETS if config["keep_scale_spaces"] is True else []
 STREAMED_SETS = [name for name in SEARCHED_SETS if name not in KEPT_SETS]
 
-# Snakemake does not see a change of installed packages; a parameter that changes with the lock
-# file tells it.
-SOFTWARE = hashlib.sha256(Path(workflow.basedir, "environment.lock").read_bytes()).hexdigest()
-
 # Compiled loops are kept with the other things that can be made again, and shared by all jobs.
-os.environ.setdefault("NUMBA_CACHE_DIR", os.path.abspath(".snakemake/numba"))
+os.environ.setdefault("NUMBA_CACHE_DIR", str(fingerprints.folder_of_loops(Path.cwd())))
+
+
+def spelled(value):
+    """A value as the commands of stages take it; 3 and 3.0 are the same number."""
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return str(value)
 
 
 class Named(str):
@@ -73,8 +78,8 @@ class Named(str):
     """
 
     def __new__(cls, name, value):
-        text = " ".join(map(str, value)) if isinstance(value, list) else str(value)
-        named = super().__new__(cls, text)
+        values = value if isinstance(value, list) else [value]
+        named = super().__new__(cls, " ".join(map(spelled, values)))
         named.name = name
         return named
 
@@ -90,6 +95,28 @@ def setting(place):
         return Named(".".join(keys), reduce(getitem, keys, config))
 
     return value_of
+
+
+def fixed(name, value):
+    """Parameter that is the same for all jobs; given as it is, Snakemake would drop its name."""
+
+    def value_of(_wildcards):
+        return Named(name, value)
+
+    return value_of
+
+
+def fingerprint(module):
+    """Parameter that changes with the code of a module and of all that it imports."""
+    return fixed(f"code of {module}", fingerprints.fingerprint(module))
+
+
+# Snakemake does not see a change of installed packages; a parameter that changes with the lock
+# file tells it.
+SOFTWARE = fixed(
+    "environment.lock",
+    hashlib.sha256(Path(workflow.basedir, "environment.lock").read_bytes()).hexdigest(),
+)
 
 
 onstart:

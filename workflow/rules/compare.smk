@@ -191,7 +191,7 @@ rule match_kappas:
 
 
 rule match_sweep:
-    """Figures 10 to 12: stability across views against aliasing, unknown blur, noise."""
+    """Figures 11 and 12: stability across views against unknown blur and noise, and scale."""
     input:
         views=views_of_sweep,
         digest=of_sweep(f"{RESULTS}/views/{{set}}.sha256"),
@@ -206,7 +206,7 @@ rule match_sweep:
     benchmark:
         f"{LOGS}/benchmarks/match_sweep/{{figure}}.tsv"
     wildcard_constraints:
-        figure=one_of(SWEEP_OF),
+        figure=one_of(sorted(set(SWEEP_OF) - {"fig10"})),
     params:
         name=name_of_sweep,
         values=values_of_sweep,
@@ -221,8 +221,8 @@ rule match_sweep:
         match_sign=setting("comparison.match_sign"),
         max_offset=setting("refinement.max_offset"),
         max_iterations=setting("refinement.max_iterations"),
-        starts=starts_of_sweep,
-        seen_by=setting("stability.seen_by"),
+        octaves=octaves_of_sweep,
+        scales=table_of_scales,
         n_resamples=setting("stability.n_resamples"),
         code=fingerprint("keystab.stages.match_sweep"),
         software=SOFTWARE,
@@ -248,14 +248,21 @@ rule match_sweep:
             --match-sign {params.match_sign} \
             --max-offset {params.max_offset} \
             --max-iterations {params.max_iterations} \
-            --starts {params.starts} \
-            --seen-by {params.seen_by} \
+            {params.octaves} \
             --n-resamples {params.n_resamples} \
             --curves {output.curves:q} \
             --counts {output.counts:q} \
-            --scales {output.scales:q} \
+            {params.scales} \
             >{log:q} 2>&1
         """
+
+
+use rule match_sweep as match_aliasing with:
+    output:
+        curves=f"{RESULTS}/tables/{{figure}}_curves.csv",
+        counts=f"{RESULTS}/tables/{{figure}}_counts.csv",
+    wildcard_constraints:
+        figure="fig10",
 
 
 rule crop_views:
@@ -270,7 +277,7 @@ rule crop_views:
     benchmark:
         f"{LOGS}/benchmarks/crop_views.tsv"
     params:
-        values=Named("noise.sweep", [one.value for one in SWEEPS["noise"]]),
+        values=fixed("noise.sweep", [one.value for one in SWEEPS["noise"]]),
         code=fingerprint("keystab.stages.crop_views"),
         software=SOFTWARE,
     message:

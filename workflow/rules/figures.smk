@@ -4,7 +4,7 @@ Comes in: tidy tables, and nothing else. Goes out: {figures}/figN.pdf and .png. 
 rule of its own, so that restyling one redraws one.
 """
 
-DRAFT = "--draft" if config["draft"] else ""
+DRAFT = fixed("draft", "--draft" if config["draft"] else "")
 
 
 rule fig1:

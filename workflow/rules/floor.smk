@@ -65,8 +65,10 @@ rule match_variants:
     benchmark:
         f"{LOGS}/benchmarks/match_variants.tsv"
     params:
-        names=Named("floor.variants", VARIANTS),
-        tolerances=Named("tolerances", [tolerance_of_variant(name) for name in VARIANTS]),
+        names=fixed("floor.variants", VARIANTS),
+        # Which extrema belong to which variant: Snakemake compares inputs without their order.
+        runs=fixed("runs", [run_of_variant(name) for name in VARIANTS]),
+        tolerances=fixed("tolerances", [tolerance_of_variant(name) for name in VARIANTS]),
         n_spo=setting("samplings.n_spo"),
         settles_at=setting("floor.settles_at"),
         sigma_min=setting("detector.sigma_min"),

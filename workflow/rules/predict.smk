@@ -142,7 +142,7 @@ rule score_predictors:
         f"{LOGS}/benchmarks/score_predictors.tsv"
     params:
         pictures=options_of_pictures,
-        n_spo=Named("predictors.n_spo", PREDICTED_N_SPO),
+        n_spo=fixed("predictors.n_spo", PREDICTED_N_SPO),
         sigma_min=setting("detector.sigma_min"),
         kappa=setting("detector.kappa"),
         space_tolerance=setting("comparison.space_tolerance"),

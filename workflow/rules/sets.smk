@@ -148,12 +148,20 @@ def in_sweep(key):
     return value_of
 
 
-def starts_of_sweep(wildcards):
-    """First scales of the octaves that lie within those searched for a figure."""
+def octaves_of_sweep(wildcards):
+    """Options of the counts against scale, in octaves within those searched; none for figure 10."""
+    if wildcards.figure == "fig10":
+        return Named("octaves", "")
     n_oct = in_sweep("n_oct")(wildcards)
     end = float(sigma_min_of_views(wildcards)) * 2 ** int(n_oct)
-    starts = config["stability"]["starts"]
-    return Named("starts", [start for start in starts if 2 * start <= end * (1 + 1e-9)])
+    starts = [one for one in config["stability"]["starts"] if 2 * one <= end * (1 + 1e-9)]
+    seen_by = config["stability"]["seen_by"]
+    return Named("octaves", ["--starts", *starts, "--seen-by", seen_by])
+
+
+def table_of_scales(_wildcards, output):
+    """Option that names the table of counts against scale, where there is one."""
+    return f"--scales {shlex.quote(output.scales)}" if "scales" in output.keys() else ""
 
 
 def blur_of_noisy_views(_wildcards):

@@ -46,9 +46,10 @@ rule camera_optics:
 
 
 rule detect_blobs:
-    """Figure S4: the scales at which blobs are detected, and those that theory says."""
+    """Figure S4: detect blobs of many sizes in all ways that are compared."""
     output:
-        table=f"{RESULTS}/tables/figS4.csv",
+        extrema=f"{RESULTS}/keypoints/blobs_extrema.parquet",
+        traces=f"{RESULTS}/keypoints/blobs_traces.parquet",
     log:
         f"{LOGS}/detect_blobs.log",
     benchmark:
@@ -63,8 +64,6 @@ rule detect_blobs:
         assumed_blurs=setting("blobs.assumed_blurs"),
         sigma_min=setting("detector.sigma_min"),
         kappa=setting("detector.kappa"),
-        max_offset=setting("refinement.max_offset"),
-        max_iterations=setting("refinement.max_iterations"),
         code=fingerprint("keystab.stages.detect_blobs"),
         software=SOFTWARE,
     message:
@@ -81,6 +80,53 @@ rule detect_blobs:
             --assumed-blurs {params.assumed_blurs} \
             --sigma-min {params.sigma_min} \
             --kappa {params.kappa} \
+            --extrema {output.extrema:q} \
+            --traces {output.traces:q} \
+            >{log:q} 2>&1
+        """
+
+
+rule match_blobs:
+    """Figure S4: the scales at which blobs are detected, and those that theory says."""
+    input:
+        extrema=f"{RESULTS}/keypoints/blobs_extrema.parquet",
+        traces=f"{RESULTS}/keypoints/blobs_traces.parquet",
+    output:
+        table=f"{RESULTS}/tables/figS4.csv",
+    log:
+        f"{LOGS}/match_blobs.log",
+    benchmark:
+        f"{LOGS}/benchmarks/match_blobs.tsv"
+    params:
+        size_from=setting("blobs.size_from"),
+        size_to=setting("blobs.size_to"),
+        size_count=setting("blobs.size_count"),
+        kappas=setting("blobs.kappas"),
+        n_spo=setting("blobs.n_spo"),
+        camera_blur=setting("blobs.camera_blur"),
+        assumed_blurs=setting("blobs.assumed_blurs"),
+        sigma_min=setting("detector.sigma_min"),
+        kappa=setting("detector.kappa"),
+        max_offset=setting("refinement.max_offset"),
+        max_iterations=setting("refinement.max_iterations"),
+        code=fingerprint("keystab.stages.match_blobs"),
+        software=SOFTWARE,
+    message:
+        "Comparing the scales of blobs with theory"
+    shell:
+        """
+        python -m keystab.stages.match_blobs \
+            --size-from {params.size_from} \
+            --size-to {params.size_to} \
+            --size-count {params.size_count} \
+            --kappas {params.kappas} \
+            --n-spo {params.n_spo} \
+            --camera-blur {params.camera_blur} \
+            --assumed-blurs {params.assumed_blurs} \
+            --sigma-min {params.sigma_min} \
+            --kappa {params.kappa} \
+            --extrema {input.extrema:q} \
+            --traces {input.traces:q} \
             --max-offset {params.max_offset} \
             --max-iterations {params.max_iterations} \
             --table {output.table:q} \

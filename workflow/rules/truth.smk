@@ -301,9 +301,9 @@ rule judge_views:
     benchmark:
         f"{LOGS}/benchmarks/judge_views.tsv"
     params:
-        sweeps=Named("sweeps", [sweep_of_set(name) for name, _ in JUDGED]),
-        values=Named("values", [value_of_set(name) for name, _ in JUDGED]),
-        n_spo=Named("n_spo", [n for _, n in JUDGED]),
+        sweeps=fixed("sweeps", [sweep_of_set(name) for name, _ in JUDGED]),
+        values=fixed("values", [value_of_set(name) for name, _ in JUDGED]),
+        n_spo=fixed("n_spo", [n for _, n in JUDGED]),
         guards=guards_of_judged_sets,
         sigma_min=setting("detector.sigma_min"),
         border=setting("comparison.border"),
@@ -409,7 +409,7 @@ rule judge_refinement:
     benchmark:
         f"{LOGS}/benchmarks/judge_refinement.tsv"
     params:
-        n_spo=Named("truth.refined_n_spo", REFINED_N_SPO),
+        n_spo=fixed("truth.refined_n_spo", REFINED_N_SPO),
         sigma_min=setting("detector.sigma_min"),
         kappa=setting("detector.kappa"),
         oversampling=setting("detector.oversampling"),

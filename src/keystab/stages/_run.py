@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 # Matrix products differ in the last bits between numbers of threads. To be set before numpy is
 # imported; Snakemake sets the same from a rule's threads.
@@ -130,6 +130,28 @@ def refinement_arguments(to: argparse.ArgumentParser) -> None:
     """Add what decides which refined keypoints are accepted."""
     required(to, "max-offset", "M_offset", type=float)
     required(to, "max-iterations", "N_interp", type=int)
+
+
+def blob_arguments(to: argparse.ArgumentParser) -> None:
+    """Add which blobs are detected and in which ways."""
+    required(to, "size-from", "smallest blob, pixels", type=float)
+    required(to, "size-to", "largest blob, pixels", type=float)
+    required(to, "size-count", "number of blobs", type=int)
+    required(to, "kappas", "ratios that are compared", type=float, nargs="+")
+    required(to, "n-spo", "scales per octave", type=int, nargs="+")
+    required(to, "camera-blur", "blur of the camera, pixels", type=float)
+    required(to, "assumed-blurs", "blurs assumed instead", type=float, nargs="+")
+    scale_arguments(to)
+
+
+def blobs_and_ways(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what `keystab.blob_tables` asks of blobs and of the ways to detect them."""
+    import numpy as np
+
+    # Rounded, so that the numbers can be read.
+    sizes = np.geomspace(args.size_from, args.size_to, args.size_count).round(6).tolist()
+    names = ("kappa", "kappas", "n_spo", "camera_blur", "assumed_blurs", "sigma_min")
+    return {"blobs": sizes, **{name: getattr(args, name) for name in names}}
 
 
 def same_arguments(to: argparse.ArgumentParser) -> None:

@@ -21,15 +21,15 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.view_range_arguments(parser)
     _run.same_arguments(parser)
     _run.refinement_arguments(parser)
-    _run.required(parser, "starts", "first scales of octaves, pixels", type=float, nargs="*")
-    _run.required(parser, "seen-by", "views that see a stable keypoint, a share", type=float)
+    parser.add_argument("--starts", help="first scales of octaves", type=float, nargs="*")
+    parser.add_argument("--seen-by", help="share of the views that see a keypoint", type=float)
     _run.required(parser, "n-resamples", "bootstrap resamples", type=int)
     _run.required(parser, "curves", "table of curves to write", type=Path)
     _run.required(parser, "counts", "table of counts to write", type=Path)
     parser.add_argument("--scales", help="table against scale to write", type=Path)
     args = parser.parse_args(argv)
-    if bool(args.starts) != (args.scales is not None):
-        parser.error("--starts and --scales go together: give both or neither")
+    if not bool(args.starts) == (args.scales is not None) == (args.seen_by is not None):
+        parser.error("--starts, --seen-by and --scales go together: give all or none")
 
     import pandas as pd
 

@@ -1,0 +1,141 @@
+"""What REPRODUCING.md says of reruns is what the workflow gives, at the paper's settings."""
+
+from __future__ import annotations
+
+import re
+import runpy
+
+import pytest
+from project import ROOT
+
+TOOL = runpy.run_path(str(ROOT / "tools/reruns.py"))
+WHY = runpy.run_path(str(ROOT / "tools/why.py"))
+Effect, Job = TOOL["Effect"], TOOL["Job"]
+PLACES = dict(TOOL["leaves"](TOOL["SCHEMA"], TOOL["BASE"]))
+TABLE = TOOL["PAGE"].read_text().split(TOOL["BEGIN"])[1].split(TOOL["END"])[0]
+ROWS = {
+    label: Effect(*row)
+    for labels, *row in (line[2:-2].split(" | ") for line in TABLE.splitlines() if "`" in line)
+    for label in re.findall("`([^`]+)`", labels)
+}
+
+
+def row_of(place: str, separator: str = ".") -> object:
+    return ROWS[place] if place in ROWS else ROWS[f"{place.rpartition(separator)[0]}{separator}*"]
+
+
+@pytest.fixture(scope="module")
+def before():
+    return TOOL["plan"]()
+
+
+@pytest.fixture(scope="module")
+def clock():
+    return TOOL["Clock"]([], TOOL["read_durations"]())
+
+
+def test_every_setting_and_module_has_a_row_and_no_other():
+    modules = [
+        path.relative_to(TOOL["PACKAGE_FOLDER"]).as_posix()
+        for path in TOOL["PACKAGE_FOLDER"].rglob("*.py")
+        if path.name != "palette.py"  # counts colour by colour
+    ]
+    for names, separator in ((PLACES, "."), (modules, "/")):
+        for name in names:
+            assert row_of(name, separator)
+    blocks = {f"{place.rpartition('.')[0]}.*" for place in PLACES}
+    blocks |= {f"{module.rpartition('/')[0]}/*" for module in modules}
+    assert set(ROWS) <= {*PLACES, *modules, *blocks}
+    assert TABLE.count("`") == 2 * len(ROWS)  # none twice
+
+
+def test_rows_of_modules_are_what_the_workflow_gives(before, clock):
+    effects = TOOL["effects_of_code"](before, clock)
+    assert {module: row_of(module, "/") for module in effects} == effects
+
+
+# One of every block; `python tools/reruns.py --check` tries all.
+SOME = [
+    *("views_dtype", "sets.still.blur", "sets.translations.n_spo", "sets.noise.sweep"),
+    *("detector.epsilon", "refinement.max_offset", "comparison.match_sign", "stability.seen_by"),
+    *("shipped.contrast", "kappas.fractions", "floor.variants.closer.epsilon", "truth.beyond"),
+    *("semigroup.blob", "grid.delta_min", "samplings.n_spo", "cubes.count", "blobs.n_spo", "logs"),
+]
+
+
+@pytest.mark.parametrize("place", SOME)
+def test_rows_of_settings_are_what_the_workflow_gives(place, before, clock):
+    after = TOOL["plan"](TOOL["change"](place, PLACES[place]))
+    assert TOOL["effect"](TOOL["reruns"](before, after), before, clock) == row_of(place)
+
+
+@pytest.mark.parametrize(
+    ("changed", "again"),
+    [
+        ({}, set()),
+        ({"params": frozenset({"a = 2"})}, {"one", "two"}),
+        ({"inputs": ("b",)}, {"one", "two"}),
+        ({"template": "other"}, {"one", "two"}),
+        ({"message": "other"}, set()),
+    ],
+)
+def test_what_runs_again_runs_all_after_it(changed, again):
+    first = Job("r", "m", "c", "t", frozenset({"a = 1"}), ("a",), frozenset())
+    second = first._replace(needs=frozenset({"one"}))
+    other = first._replace(rule="other")
+    plan = {"one": first, "two": second, "three": other}
+    after = {**plan, "one": first._replace(**changed)}
+    assert TOOL["reruns"](plan, after).keys() == again
+
+
+def test_a_change_that_snakemake_does_not_see_is_an_error():
+    job = Job("r", "m", "stage --x a b", "t", frozenset(), ("a", "b"), frozenset())
+    with pytest.raises(RuntimeError, match="would not run"):
+        TOOL["reruns"]({"one": job}, {"one": job._replace(command="stage --x b a")})
+
+
+@pytest.mark.parametrize(
+    "overlay",
+    ["refinement: {max_offset: 0.7}", "floor: {variants: {closer_1e6: {set: still}}}"],
+)
+def test_plans_are_compared_as_snakemake_compares_them(finished, overlay):
+    (finished.folder / "config/change.yaml").write_text(overlay + "\n")
+    jobs = finished.would_run("--configfile", "config/quick.yaml", "config/change.yaml")
+    files = [finished.folder / "config" / name for name in ("quick.yaml", "change.yaml")]
+    quick, changed = (TOOL["plan"](TOOL["settings"].read_yaml(*files[:n])) for n in (1, 2))
+    again = [job.rule for job in TOOL["reruns"](quick, changed).values()]
+    assert {rule: again.count(rule) for rule in again} == {
+        k: v for k, v in jobs.items() if k != "all"
+    }
+
+
+def test_why_says_what_changed_and_what_follows(finished):
+    (finished.folder / "config/change.yaml").write_text("refinement: {max_offset: 0.7}\n")
+    overlays = ("--configfile", "config/quick.yaml", "config/change.yaml")
+    status, said = finished.dry_run(*overlays, "--", "figures/quick/fig7.pdf")
+    assert status == 0
+    durations = {
+        "Drawing figures/quick/fig7.pdf": 7.0,
+        "Matching the keypoints of SIFT as shipped": 2,
+    }
+    lines = list(WHY["in_lines"](WHY["jobs_and_reasons"](said), TOOL["Clock"]([], durations)))
+    assert lines[0].startswith("3 jobs would run, about ")
+    assert lines[1] == "Because refinement.max_offset was 0.6 and is 0.7:"
+    assert "  Matching the keypoints of SIFT as shipped (2 s)" in lines[2:4]
+    assert lines[4:] == ["After these:", "  Drawing figures/quick/fig7.pdf (7 s)"]
+    finished.edit("src/keystab/roc.py", "import annotations", "import annotations\nMORE = 1")
+    _, said = finished.dry_run("--configfile", "config/quick.yaml", "--", "figures/quick/fig5.pdf")
+    lines = list(WHY["in_lines"](WHY["jobs_and_reasons"](said), TOOL["Clock"]([], {})))
+    assert lines[1] == "Because code of keystab.stages.score_features changed:"
+
+
+def test_why_stays_short():
+    jobs = [(f"{word} 1", "Missing output files: a") for word in "abcdefghijklmnop"]
+    jobs += [(f"Detecting {n}", "Code has changed since last execution") for n in range(90)]
+    lines = list(WHY["in_lines"](jobs, TOOL["Clock"]([], {})))
+    assert lines[-2:] == [
+        "Because the rule has another command:",
+        "  Detecting 0, and 89 like it (4 min 30 s)",
+    ]
+    assert "  and 8 other jobs (24 s)" in lines
+    assert len(lines) == 13
