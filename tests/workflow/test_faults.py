@@ -20,6 +20,7 @@ STUDY = [sys.executable, str(ROOT / "tools/study.py"), "--cores", "2"]  # what `
 TINY = """
 sets: {still: {step: 40}}
 samplings: {n_spo: [3, 4]}
+floor: {settles_at: 4}
 keep_scale_spaces: [3]
 results: results/tiny
 figures: figures/tiny

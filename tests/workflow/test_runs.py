@@ -8,6 +8,7 @@ from project import copy_of_project
 TINY = """
 sets: {still: {step: 40}, examples: {step: [40, 28, 20]}}
 samplings: {n_spo: [3, 4]}
+floor: {settles_at: 4}
 keep_scale_spaces: KEEP
 reference_sha256: SHA
 results: results/tiny
@@ -76,6 +77,7 @@ sets:
   blur_errors: {blur: [0.7, 0.3], step: 40, n_spo: [4]}
 stability: {curve_n_spo: [3, 5], n_resamples: 100}
 samplings: {n_spo: [3, 4]}
+floor: {settles_at: 4}
 keep_scale_spaces: KEEP
 results: results/tiny
 figures: figures/tiny
