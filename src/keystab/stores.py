@@ -208,18 +208,25 @@ class StoredScaleSpace:
         Raises
         ------
         InputError
-            If a chunk is damaged.
+            If a chunk is damaged, or gone since the store was opened.
         """
         try:
-            return np.asarray(self._dog[slices, rows, columns])
+            values = np.asarray(self._dog[slices, rows, columns])
         except ValueError as error:
-            assert self._dog.shards is not None
-            start, stop, _ = rows.indices(self.shape[1])
-            first, last = start // self._dog.shards[1], (stop - 1) // self._dog.shards[1]
-            raise InputError(
-                f"{self._folder}: damaged data in the rows of tiles {first} to {last} ({error}); "
-                "delete the store and make it again"
-            ) from None
+            raise self._damaged(rows, str(error)) from None
+        # Zarr reads what is gone as NaN, in which a search would find no extrema.
+        if np.isnan(values).any():
+            raise self._damaged(rows, "parts of it are gone")
+        return values
+
+    def _damaged(self, rows: slice, reason: str) -> InputError:
+        assert self._dog.shards is not None
+        start, stop, _ = rows.indices(self.shape[1])
+        first, last = start // self._dog.shards[1], (stop - 1) // self._dog.shards[1]
+        return InputError(
+            f"{self._folder}: damaged data in the rows of tiles {first} to {last} ({reason}); "
+            "delete the store and make it again"
+        )
 
     def attributes(self) -> dict[str, object]:
         """Everything that was stored beside the values."""

@@ -166,6 +166,14 @@ def test_flipped_bit_raises(store, position):
     np.testing.assert_array_equal(space["dog"][:, 64:].to_numpy(), WHOLE[:, 64:])
 
 
+def test_a_chunk_that_goes_while_the_store_is_open_raises(store):
+    opened = stores.StoredScaleSpace(store)
+    (store / "data.zarr" / "dog" / "c" / "0" / "1" / "0").unlink()
+    with pytest.raises(InputError, match=r"tiles 1 to 1 \(parts of it are gone\); delete"):
+        opened.window(rows=slice(32, 64))
+    np.testing.assert_array_equal(opened.window(rows=slice(64, 96)), WHOLE[:, 64:96])
+
+
 def test_flipped_bit_in_a_coordinate_raises(store):
     flip(store / "data.zarr" / "sigma" / "c" / "0", 3)
     with pytest.raises(ValueError, match="checksum"):
