@@ -13,12 +13,10 @@ from __future__ import annotations
 import ast
 import base64
 import csv
-import hashlib
 import importlib
 import json
 import os
 import platform
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,34 +26,17 @@ import jinja2
 import yaml
 from docutils.core import publish_parts
 from rule_graph import drawn, edges_of
-from snakemake.utils import update_config
 
 import keystab
-from keystab import settings
 from keystab.claims import VERDICTS
+from keystab.errors import InputError
 from keystab.files import written_whole
 from keystab.fingerprint import fingerprint
+from keystab.provenance import file_digest
+from keystab.workflow import Study
 
 ROOT = Path(__file__).parents[1]
 PAGE = "page.html.jinja"
-
-
-def snakemake(*arguments: str) -> str:
-    """What Snakemake says when asked."""
-    command = [sys.executable, "-m", "snakemake", *arguments]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    if run.returncode:
-        sys.exit(run.stderr)
-    return run.stdout + run.stderr
-
-
-def complete_settings(overlays: list[str]) -> dict[str, Any]:
-    """Settings of the run, as the rules see them."""
-    given: dict[str, Any] = {}
-    for name in ["config/config.yaml", *overlays]:
-        update_config(given, yaml.safe_load((ROOT / name).read_text()))
-    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
-    return settings.checked(given, schema)
 
 
 def caption(name: str, config: dict[str, Any]) -> str:
@@ -63,11 +44,6 @@ def caption(name: str, config: dict[str, Any]) -> str:
     text = (ROOT / f"workflow/report/{name}.rst").read_text()
     filled = jinja2.Template(text).render(snakemake=SimpleNamespace(config=config))
     return str(publish_parts(filled, writer="html5")["body"])
-
-
-def digest(path: Path) -> str:
-    """SHA-256 of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def figure(name: str, config: dict[str, Any]) -> dict[str, Any]:
@@ -81,7 +57,7 @@ def figure(name: str, config: dict[str, Any]) -> dict[str, Any]:
         "png": base64.b64encode(png.read_bytes()).decode(),
         "caption": caption(name, config),
         "code": fingerprint(module.__name__),
-        "tables": [(table.name, digest(table)) for table in tables],
+        "tables": [(table.name, file_digest(table)) for table in tables],
         "command": f"make {config['figures']}/{name}.pdf",
     }
 
@@ -140,11 +116,14 @@ def figures_of_study() -> list[str]:
 def main(arguments: list[str]) -> int:
     """Write {results}/report.html."""
     overlays = [argument for argument in arguments if argument != "--configfile"]
-    given = ["--configfile", *overlays] if overlays else []
-    config = complete_settings(overlays)
-    if "Nothing to be done" not in snakemake("--dry-run", *given):
-        sys.exit("error: the study is not finished with these settings; run make study first")
-    graph = edges_of(snakemake(*given, "--rulegraph", "dot"))
+    try:
+        study = Study(ROOT, overlays)
+        if study.to_do():
+            sys.exit("error: the study is not finished with these settings; run make study first")
+        graph = edges_of(study.snakemake("--rulegraph=dot", output_only=True))
+    except InputError as problem:
+        sys.exit(f"error: {problem}")
+    config = study.settings
     ledger = claims(config)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(ROOT / "workflow/report"), autoescape=True
@@ -161,10 +140,10 @@ def main(arguments: list[str]) -> int:
         machine=f"{os.cpu_count()} cores ({platform.machine()}), {platform.system()}, "
         f"Python {platform.python_version()}",
         made_from=[
-            ("settings, complete, as JSON", digest_of(config)),
-            ("environment.lock", digest(ROOT / "environment.lock")),
-            (config["reference"], digest(ROOT / config["reference"])),
-            ("config/claims.yaml", digest(ROOT / "config/claims.yaml")),
+            ("settings, complete, as JSON", study.settings_digest),
+            ("environment.lock", study.lock_digest),
+            (config["reference"], file_digest(ROOT / config["reference"])),
+            ("config/claims.yaml", file_digest(ROOT / "config/claims.yaml")),
         ],
         settings=yaml.safe_dump(config, sort_keys=False, default_flow_style=None, width=100),
     )
@@ -173,11 +152,6 @@ def main(arguments: list[str]) -> int:
         part.write_text(html, encoding="utf-8")
     print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1e6:.1f} MB; open it in any browser")
     return 0
-
-
-def digest_of(config: dict[str, Any]) -> str:
-    """SHA-256 of the complete settings."""
-    return hashlib.sha256(json.dumps(config, sort_keys=True).encode()).hexdigest()
 
 
 if __name__ == "__main__":

@@ -20,8 +20,6 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-import yaml
-
 DURATIONS = Path(__file__).with_name("durations.csv")
 
 JOB = re.compile(r"^Job (\d+): (.+)$")
@@ -116,9 +114,9 @@ def config_files(arguments: list[str]) -> list[str]:
 
 def not_writable(arguments: list[str]) -> list[str]:
     """Folders of the settings in which nothing can be written."""
-    settings: dict[str, object] = {}
-    for name in ["config/config.yaml", *config_files(arguments)]:
-        settings.update(yaml.safe_load(Path(name).read_text()) or {})
+    from keystab.settings import read_yaml
+
+    settings = read_yaml("config/config.yaml", *config_files(arguments))
     folders = [".snakemake", *(str(settings[key]) for key in ("results", "figures", "logs"))]
     return [folder for folder in folders if not os.access(existing(Path(folder)), os.W_OK)]
 

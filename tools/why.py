@@ -14,10 +14,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from keystab.workflow import jobs_and_reasons
+
 sys.path.insert(0, str(Path(__file__).parent))
 from study import Clock, in_words, kind_of, read_durations, wrong_file  # noqa: E402
 
-JOB = re.compile(r"^Job \d+: (?P<job>.+)\nReason: (?P<reason>.+)$", re.MULTILINE)
 PARAMS = re.compile(r"Union of exclusive params .*?: before: (?P<before>.*?) now: (?P<now>.*)$")
 PARAM = re.compile(
     r"'?(?P<name>[\w.]+|code of [\w.]+) = (?P<value>.*?)'?(?=,'?[\w.]+ = |,'?code of |$)"
@@ -25,11 +26,6 @@ PARAM = re.compile(
 FOLLOWS = "Input files updated by another job"
 MOST = 8
 """Lines that one reason may take."""
-
-
-def jobs_and_reasons(plan: str) -> list[tuple[str, str]]:
-    """Jobs of a dry run, by what they say about themselves, with Snakemake's reasons."""
-    return [(found["job"], found["reason"]) for found in JOB.finditer(plan)]
 
 
 def in_short(reason: str) -> str:

@@ -19,7 +19,7 @@ from keystab.errors import InputError
 from keystab.fingerprint import folder_of_loops
 from keystab.settings import Settings, checked, read_yaml
 
-__all__ = ["Output", "Study", "find_project"]
+__all__ = ["Output", "Study", "find_project", "jobs_and_reasons"]
 
 _FOLDERS = ("results", "figures", "logs")
 _JOB = re.compile(r"^Job \d+: (.*)\n *[Rr]eason: (.*)$", re.MULTILINE)
@@ -112,7 +112,7 @@ class Study:
         said = self.snakemake("--dry-run", *targets)
         if "Nothing to be done" in said:
             return []
-        found = _JOB.findall(said)
+        found = jobs_and_reasons(said)
         own = {
             job: "; ".join(it for it in why.split("; ") if not it.startswith(_FOLLOWS))
             for job, why in found
@@ -161,6 +161,11 @@ class Study:
         if not self.overlays:
             return []
         return ["--configfile", *(str(overlay) for overlay in self.overlays)]
+
+
+def jobs_and_reasons(plan: str) -> list[tuple[str, str]]:
+    """Jobs of a dry run, by what they say about themselves, with Snakemake's reasons."""
+    return _JOB.findall(plan)
 
 
 def find_project(start: Path | None = None) -> Path:
