@@ -18,6 +18,7 @@ once the gains of the Gaussian are put into C.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
@@ -84,17 +85,7 @@ def interpolation(
 
 
 class BandLimitedSearch:
-    """Candidates for extrema of a scale-space, one column of blocks at a time.
-
-    Parameters
-    ----------
-    space : ScaleSpace
-        The octave, for which `applies` is true.
-    tolerance : float
-        By how much an extremum differs from each of its 26 neighbours.
-    rows, columns : slice
-        Samples that are asked for; others may be among the candidates.
-    """
+    """Candidates for extrema; used as `keystab.interpolated_search.InterpolatedSearch`."""
 
     length, abreast = _ROWS, _COLUMNS
 
@@ -105,17 +96,17 @@ class BandLimitedSearch:
         y_axis, x_axis = space.axes
         assert isinstance(y_axis, CosineAxis) and isinstance(x_axis, CosineAxis)
         self.y_axis, self.x_axis = y_axis, x_axis
-        y_nodes, self.y_expand = _of(space, self.length)
+        self.y_nodes, self.y_expand = _of(space, self.length)
         self.x_nodes, self.x_expand = _of(space, self.abreast)
         count = int(y_axis.n_frequencies.max())
-        self.y_rows = y_axis.basis(self.y_starts[:, None] + y_nodes, count)
+        self.y_rows = y_axis.basis(self.y_starts[:, None] + self.y_nodes, count)
         self.bounds = self._bounds()
 
     def _bounds(self) -> NDArray[np.float64]:
         """Bound of the interpolation error of every slice."""
         y_axis, x_axis, magnitude = self.y_axis, self.x_axis, np.abs(self.space.source)
-        r_y = _largest_residual(y_axis, self.y_starts, self.length, self.y_expand)
-        r_x = _largest_residual(x_axis, np.array(self.x_starts), self.abreast, self.x_expand)
+        r_y = _largest_residual(y_axis, self.y_starts, self.y_nodes, self.y_expand)
+        r_x = _largest_residual(x_axis, self.x_starts, self.x_nodes, self.x_expand)
         bound = np.array(
             [
                 (r_y * g_y) @ magnitude @ g_x + ((1 + r_y) * g_y) @ magnitude @ (r_x * g_x)
@@ -174,13 +165,15 @@ def _of(space: ScaleSpace, n_samples: int) -> tuple[NDArray[np.int64], NDArray[n
 
 
 def _largest_residual(
-    axis: CosineAxis, starts: NDArray[np.int64], length: int, expand: NDArray[np.float64]
+    axis: CosineAxis,
+    starts: Iterable[int],
+    nodes: NDArray[np.int64],
+    expand: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Largest entry of L - E N of each frequency, for all blocks of an axis."""
-    nodes, _ = interpolation(length, axis.spacing) or ((), ())
     largest = np.zeros(axis.n_pixels)
     for start in starts:
-        rows = axis.basis(np.arange(start, start + length))
+        rows = axis.basis(start + np.arange(len(expand)))
         np.maximum(largest, np.abs(rows - expand @ rows[nodes]).max(axis=0), out=largest)
     return largest
 

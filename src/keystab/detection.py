@@ -10,7 +10,7 @@ import pandas as pd
 from keystab import checks
 from keystab.dog_space import ScaleSpace, scale_space
 from keystab.errors import InputError
-from keystab.extrema import discrete_extrema
+from keystab.extrema import extrema_and_cubes
 from keystab.refinement import (
     GRADIENT_COLUMNS,
     HESSIAN_COLUMNS,
@@ -129,7 +129,7 @@ def detect_keypoints(
         space = scale_space(
             image, camera_blur, n_spo, delta_min, sigma_min, kappa, oversampling, octave, slices
         )
-        table = extrema_table(space, discrete_extrema(space, epsilon, threads))
+        table = extrema_table(space, *extrema_and_cubes(space, epsilon, threads))
         scale = table["step_sigma"]
         if refine:
             models = trace(
@@ -151,7 +151,9 @@ def detect_keypoints(
     return pd.concat(kept, ignore_index=True)
 
 
-def extrema_table(space: ScaleSpace, extrema: np.ndarray) -> pd.DataFrame:
+def extrema_table(
+    space: ScaleSpace, extrema: np.ndarray, cubes: np.ndarray | None = None
+) -> pd.DataFrame:
     """Describe discrete extrema by their neighbourhoods.
 
     Parameters
@@ -160,6 +162,8 @@ def extrema_table(space: ScaleSpace, extrema: np.ndarray) -> pd.DataFrame:
         Where they were found.
     extrema : ndarray of int, shape (n, 4)
         From `keystab.extrema.discrete_extrema`.
+    cubes : ndarray, shape (n, 3, 3, 3), optional
+        Their neighbourhoods, from `keystab.extrema.extrema_and_cubes`; evaluated when omitted.
 
     Returns
     -------
@@ -172,7 +176,8 @@ def extrema_table(space: ScaleSpace, extrema: np.ndarray) -> pd.DataFrame:
         Hessian).
     """
     s, row, column, sign = extrema.T
-    cubes = space.neighbourhoods(s, row, column)
+    if cubes is None:
+        cubes = space.neighbourhoods(s, row, column)
     value = cubes[:, 1, 1, 1]
     around = cubes.reshape(-1, 27)[:, _NEIGHBOURS]
     gradient, hessian = quadratic_model(cubes)

@@ -11,8 +11,10 @@ grid was cut into blocks nor on whether the values come from a store.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from typing import Any
 
 import numpy as np
 import threadpoolctl
@@ -33,6 +35,9 @@ BLOCK_COLUMNS = 256
 
 # Rows whose operators are held at once: bounds the memory on large images.
 BAND_ROWS = 8192
+
+Decided = tuple[np.ndarray, np.ndarray]
+"""Extrema, shape (n, 4), and their cubes of samples, shape (n, 3, 3, 3)."""
 
 
 def discrete_extrema(
@@ -68,6 +73,27 @@ def discrete_extrema(
     InputError
         If `epsilon` is negative or not finite, or `threads` is less than 1.
     """
+    return extrema_and_cubes(space, epsilon, threads, show_progress, window)[0]
+
+
+def extrema_and_cubes(
+    space: ScaleSpace,
+    epsilon: float = 0.0,
+    threads: int = 1,
+    show_progress: bool = False,
+    window: tuple[slice, slice] | None = None,
+) -> Decided:
+    """Discrete extrema with their neighbourhoods, which have decided that they are extrema.
+
+    Parameters, order and errors are those of `discrete_extrema`.
+
+    Returns
+    -------
+    extrema : ndarray of int64, shape (n, 4)
+        As from `discrete_extrema`.
+    cubes : ndarray, shape (n, 3, 3, 3)
+        As from `ScaleSpace.neighbourhoods`.
+    """
     checks.number("epsilon", epsilon, least=0)
     checks.integer("threads", threads, least=1)
     height, width = space.sampling.shape
@@ -80,16 +106,21 @@ def discrete_extrema(
     tolerance = max(epsilon, space.rounding)
     space.source, space.axes, space.blurs  # noqa: B018  made once, before threads share them
     what = f"extrema, n_spo {space.sampling.n_spo}" if show_progress else None
+    found = [decided(space, np.empty((0, 4), dtype=np.int64), tolerance)]
     with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
-        searched = inner_window(space, window)
-        if interpolated_search.applies(space):
-            found = _interpolated(InterpolatedSearch(space, tolerance, *searched), pool, what)
-        elif band_limited_search.applies(space):
-            found = _interpolated(BandLimitedSearch(space, tolerance, *searched), pool, what)
-        else:
-            found = _evaluated(space, tolerance, pool, what, searched)
-    extrema = within(np.concatenate([np.empty((0, 4), dtype=np.int64), *found]), window)
-    return extrema[np.lexsort((extrema[:, 2], extrema[:, 1], extrema[:, 0]))]
+        for find, columns in _searches(space, tolerance, pool, inner_window(space, window)):
+            candidates = pool.map(find, columns)
+            # Decided once all columns are given out: short tasks for threads that have none left.
+            tasks = [
+                pool.submit(decided, space, some, tolerance)
+                for some in (progress(candidates, len(columns), what) if what else candidates)
+            ]
+            found += [task.result() for task in tasks]
+    extrema, cubes = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    # Columns of blocks may overlap by the samples that have no neighbours in one of them.
+    extrema, first = np.unique(extrema, axis=0, return_index=True)
+    inside = within(extrema, window)
+    return extrema[inside], cubes[first[inside]]
 
 
 def inner_window(
@@ -106,61 +137,69 @@ def inner_window(
 
 
 def within(extrema: np.ndarray, window: tuple[slice, slice] | None) -> np.ndarray:
-    """Extrema of some rows and columns; all where there is no window."""
-    if window is None:
-        return extrema
+    """Which extrema lie in some rows and columns; all where there is no window."""
     inside = np.ones(len(extrema), dtype=bool)
-    for position, asked in zip(extrema[:, 1:3].T, window, strict=True):
-        inside &= (position >= asked.start) & (position < asked.stop)
-    return extrema[inside]
+    if window is not None:
+        for position, asked in zip(extrema[:, 1:3].T, window, strict=True):
+            inside &= (position >= asked.start) & (position < asked.stop)
+    return inside
 
 
-def _evaluated(
-    space: ScaleSpace,
-    tolerance: float,
-    pool: ThreadPoolExecutor,
-    what: str | None,
-    window: tuple[slice, slice],
-) -> list[np.ndarray]:
-    """Extrema from all samples, evaluated block by block."""
-    found: list[np.ndarray] = []
+def _searches(
+    space: ScaleSpace, tolerance: float, pool: ThreadPoolExecutor, window: tuple[slice, slice]
+) -> Iterator[tuple[Callable[[Any], np.ndarray], Sequence[Any]]]:
+    """What finds the candidates of a column of blocks, and the columns; large images take turns."""
+    few: InterpolatedSearch | BandLimitedSearch | None = None
+    if interpolated_search.applies(space):
+        few = InterpolatedSearch(space, tolerance, *window)
+    elif band_limited_search.applies(space):
+        few = BandLimitedSearch(space, tolerance, *window)
+    if few is not None:
+        yield partial(_interpolated, few), range(few.n_columns)
+        return
     columns = list(ranges(window[1].start, window[1].stop, BLOCK_COLUMNS))
     for top, bottom in ranges(window[0].start, window[0].stop, BAND_ROWS):
         rows = list(ranges(top, bottom, BLOCK_ROWS))
         along = list(pool.map(lambda r: space.axes[0].block(r[0] - 1, r[1] + 1), rows))
-        searches = pool.map(partial(_search_column, space, rows, along, tolerance), columns)
-        found += progress(searches, len(columns), what) if what else searches
-    return found
+        yield partial(_evaluated, space, rows, along, tolerance), columns
 
 
-def _interpolated(
-    search: InterpolatedSearch | BandLimitedSearch, pool: ThreadPoolExecutor, what: str | None
-) -> list[np.ndarray]:
-    """Extrema from few samples and a bound on what lies between."""
-    searches = pool.map(partial(_search_interpolated, search), range(search.n_columns))
-    found = list(progress(searches, search.n_columns, what) if what else searches)
-    # Columns of blocks overlap by the samples that have no neighbours in one of them.
-    return [np.unique(np.concatenate(found), axis=0)]
-
-
-def _search_interpolated(search: InterpolatedSearch | BandLimitedSearch, column: int) -> np.ndarray:
-    """Extrema of one column of blocks: candidates, and what has too many of them, decided."""
-    space, tolerance = search.space, search.tolerance
+def _interpolated(search: InterpolatedSearch | BandLimitedSearch, column: int) -> np.ndarray:
+    """Candidates of one column of blocks, from few samples and a bound on what lies between."""
+    space = search.space
     candidates, undecided = search.candidates(column)
     dense = [
         extrema_of_array(
             space.window(
                 slice(None), slice(top, top + search.length), slice(left, left + search.abreast)
             ),
-            tolerance - space.rounding / 2,
+            search.tolerance - space.rounding / 2,
             (top, left),
         )
         for top, left in undecided
     ]
-    return decided(space, np.unique(np.concatenate([candidates, *dense]), axis=0), tolerance)
+    return np.concatenate([candidates, *dense])
 
 
-def decided(space: ScaleSpace, candidates: np.ndarray, tolerance: float) -> np.ndarray:
+def _evaluated(
+    space: ScaleSpace,
+    rows: list[tuple[int, int]],
+    along: list[Block],
+    tolerance: float,
+    columns: tuple[int, int],
+) -> np.ndarray:
+    """Candidates of one column of blocks, from all its samples; blocks have one sample around."""
+    first, last = columns[0] - 1, columns[1] + 1
+    blocks = space.blocks(along, (first, last), (0, space.shape[0]))
+    return np.concatenate(
+        [
+            extrema_of_array(dog, tolerance - space.rounding / 2, (top - 1, first))
+            for (top, _), dog in zip(rows, blocks, strict=True)
+        ]
+    )
+
+
+def decided(space: ScaleSpace, candidates: np.ndarray, tolerance: float) -> Decided:
     """Decide which samples are extrema, each from its own neighbourhood.
 
     Parameters
@@ -168,20 +207,24 @@ def decided(space: ScaleSpace, candidates: np.ndarray, tolerance: float) -> np.n
     space : ScaleSpace
         The octave.
     candidates : ndarray of int64, shape (n, 4)
-        Slice, row and column of samples; the fourth column is not used.
+        Slice, row and column of samples, each once or more often; the fourth column is not used.
     tolerance : float
         By how much an extremum differs from each of its 26 neighbours.
 
     Returns
     -------
-    ndarray of int64, shape (m, 4)
-        The extrema among them with their signs.
+    extrema : ndarray of int64, shape (m, 4)
+        The extrema among them with their signs, ordered by s, row, column.
+    cubes : ndarray, shape (m, 3, 3, 3)
+        Their neighbourhoods.
     """
-    cubes = space.neighbourhoods(*candidates[:, :3].T).reshape(-1, 27)
-    difference = np.delete(cubes[:, 13:14] - cubes, 13, axis=1)
+    places = np.unique(candidates[:, :3], axis=0)
+    cubes = space.neighbourhoods(*places.T)
+    around = cubes.reshape(-1, 27)
+    difference = np.delete(around[:, 13:14] - around, 13, axis=1)
     sign = (difference > tolerance).all(axis=1).astype(np.int64)
     sign -= (difference < -tolerance).all(axis=1)
-    return np.column_stack([candidates[:, :3], sign])[sign != 0]
+    return np.column_stack([places, sign])[sign != 0], cubes[sign != 0]
 
 
 def bytes_of_search(space: ScaleSpace, threads: int = 1) -> float:
@@ -241,23 +284,6 @@ def extrema_of_array(
     extrema[:, 1] += offset[0]
     extrema[:, 2] += offset[1]
     return extrema
-
-
-def _search_column(
-    space: ScaleSpace,
-    rows: list[tuple[int, int]],
-    along: list[Block],
-    tolerance: float,
-    columns: tuple[int, int],
-) -> np.ndarray:
-    """Extrema of one column of blocks; blocks have one sample around those searched."""
-    first, last = columns[0] - 1, columns[1] + 1
-    blocks = space.blocks(along, (first, last), (0, space.shape[0]))
-    candidates = [
-        extrema_of_array(dog, tolerance - space.rounding / 2, (top - 1, first))
-        for (top, _), dog in zip(rows, blocks, strict=True)
-    ]
-    return decided(space, np.concatenate(candidates), tolerance)
 
 
 @njit(cache=True, nogil=True)

@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from keystab.block_rows import AxisBlocks, axis_blocks, expansion, whole_rows
+from keystab.block_rows import axis_blocks, expansion, whole_rows
 from keystab.block_scan import ROOM, SINGLE_ROUNDING, difference, gathered, scan, starts_of
 from keystab.dog_space import ScaleSpace
 from keystab.operators import SplineAxis
@@ -66,57 +66,25 @@ def block_length(space: ScaleSpace) -> int:
     return min(48, int(_LENGTH * sampling.sigma_min / sampling.delta_min))
 
 
-def error_bounds(
-    space: ScaleSpace, y_blocks: AxisBlocks, x_blocks: AxisBlocks
-) -> NDArray[np.float64]:
-    """Bound of the interpolation error of every slice, row of blocks and group of blocks abreast.
-
-    Returns
-    -------
-    ndarray, shape (n_y_blocks, n_x_groups, n_slices)
-    """
-    blurs, lower, upper = space.blurs
-    source = space.source
-    parts = [np.abs(source), *(np.abs(np.diff(source, 4, axis=axis)) for axis in (0, 1))]
-    overall = [float(part.max(initial=0.0)) for part in parts]
-    n_y, n_x = y_blocks.start.size, x_blocks.start.size // _ABREAST
-    bound = np.empty((n_y, n_x, blurs.size))
-    n_local = int(np.searchsorted(blurs, _SMOOTH))  # blurs ascend
-    local = [_local_maxima(part, y_blocks, x_blocks, n_local) for part in parts]
-
-    def worst(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return values.reshape(n_x, _ABREAST).max(axis=1)
-
-    for blur in range(blurs.size):
-        if blur < n_local:
-            level, along_y, along_x = (maxima[blur] for maxima in local)
-        else:
-            level, along_y, along_x = (np.full((n_y, n_x), value) for value in overall)
-        e_y = y_blocks.smooth[:, blur, None] * along_y + y_blocks.rough[:, blur, None] * level
-        e_x = worst(x_blocks.smooth[:, blur]) * along_x + worst(x_blocks.rough[:, blur]) * level
-        bound[:, :, blur] = worst(x_blocks.norm[:, blur]) * e_y
-        bound[:, :, blur] += (y_blocks.norm[:, blur] + y_blocks.residual[:, blur])[:, None] * e_x
-    return bound[:, :, lower] + bound[:, :, upper]
-
-
 @njit(cache=True, nogil=True)
-def _local_maxima(values, y_blocks, x_blocks, n_blurs):
-    """Largest value that a row of blocks and a group abreast meet at the first blurs, 0 if none."""
-    n_y, n_x = y_blocks.start.size, x_blocks.start.size // _ABREAST
-    maxima = np.zeros((n_blurs, n_y, n_x))
-    band = np.empty(values.shape[1])
+def _local_maxima(values, y_blocks, x_blocks, column, n_blurs):
+    """Largest value that each block of one column meets at the first blurs, 0 if none."""
+    maxima = np.zeros((n_blurs, y_blocks.start.size))
+    across = np.empty(values.shape[0])
+    group = slice(column * _ABREAST, (column + 1) * _ABREAST)
     for blur in range(n_blurs):
-        for i in range(n_y):
+        first = x_blocks.first[group, blur]
+        left = first.min()
+        right = min((first + x_blocks.width[group, blur]).max(), values.shape[1])
+        for y in range(across.size):
+            largest = 0.0
+            for x in range(left, right):
+                largest = max(largest, values[y, x])
+            across[y] = largest
+        for i in range(y_blocks.start.size):
             top = y_blocks.first[i, blur]
-            band[:] = 0.0
-            for y in range(top, min(top + y_blocks.width[i, blur], values.shape[0])):
-                for x in range(band.size):
-                    band[x] = max(band[x], values[y, x])
-            for j in range(n_x):
-                for block in range(j * _ABREAST, (j + 1) * _ABREAST):
-                    left = x_blocks.first[block, blur]
-                    for x in range(left, min(left + x_blocks.width[block, blur], band.size)):
-                        maxima[blur, i, j] = max(maxima[blur, i, j], band[x])
+            for y in range(top, min(top + y_blocks.width[i, blur], across.size)):
+                maxima[blur, i] = max(maxima[blur, i], across[y])
     return maxima
 
 
@@ -144,10 +112,12 @@ class InterpolatedSearch:
         each = tuple(start + k * length for start in self.x_starts for k in range(_ABREAST))
         self.y_blocks = axis_blocks(y_axis, y_starts, length)
         self.x_blocks = axis_blocks(x_axis, each, length)
-        self.bounds = error_bounds(space, self.y_blocks, self.x_blocks)
+        source = space.source
+        # What the bounds are made of: the source, and its fourth differences along each axis.
+        self.parts = [np.abs(source), *(np.abs(np.diff(source, 4, axis=axis)) for axis in (0, 1))]
+        self.largest = [float(part.max(initial=0.0)) for part in self.parts]
         blurs, lower, upper = space.blurs
         self.n_kinked = int((blurs[lower] < _KINKED).sum())  # the first slices
-        self.bounds[:, :, : self.n_kinked] = 0.0
         kinked = np.unique([lower[: self.n_kinked], upper[: self.n_kinked]])
         self.kinked = tuple(int(blur) for blur in kinked)
         every = whole_rows(y_axis, y_starts, length, self.kinked)
@@ -159,17 +129,34 @@ class InterpolatedSearch:
         """Columns of blocks."""
         return len(self.x_starts)
 
-    def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[int, int]]]:
-        """Samples of one column of blocks that may be extrema.
+    def error_bounds(self, column: int) -> NDArray[np.float64]:
+        """Bound of the interpolation error of every block of a column, and of every slice.
 
         Returns
         -------
-        candidates : ndarray of int, shape (n, 4)
-            Slice, row, column; the fourth column is not used. Blocks overlap, and a sample may be
-            there twice.
-        undecided : list of (int, int)
-            First row and first column of blocks that had too many, of which none are returned.
+        ndarray, shape (n_y_blocks, n_slices)
         """
+        blurs, lower, upper = self.space.blurs
+        y_blocks, x_blocks = self.y_blocks, self.x_blocks
+        n_local = int(np.searchsorted(blurs, _SMOOTH))  # blurs ascend
+        level, along_y, along_x = (
+            np.repeat(largest, blurs.size * y_blocks.start.size).reshape(blurs.size, -1)
+            for largest in self.largest
+        )
+        for part, maxima in zip(self.parts, (level, along_y, along_x), strict=True):
+            maxima[:n_local] = _local_maxima(part, y_blocks, x_blocks, column, n_local)
+        group = slice(column * _ABREAST, (column + 1) * _ABREAST)
+        smooth, rough, norm = (
+            of_blocks[group].max(axis=0)[:, None]
+            for of_blocks in (x_blocks.smooth, x_blocks.rough, x_blocks.norm)
+        )
+        e_y = y_blocks.smooth.T * along_y + y_blocks.rough.T * level
+        e_x = smooth * along_x + rough * level
+        bound = norm * e_y + (y_blocks.norm + y_blocks.residual).T * e_x
+        return np.ascontiguousarray((bound[lower] + bound[upper]).T)
+
+    def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[int, int]]]:
+        """Samples of one column of blocks that may be extrema; see `block_scan.gathered`."""
         space, blocks = self.space, self.x_blocks
         _, lower, upper = space.blurs
         nodes, expand = expansion(self.length)
@@ -209,7 +196,7 @@ class InterpolatedSearch:
             np.searchsorted(self.kinked, upper[: self.n_kinked]),
             single,
             np.ascontiguousarray(single.T),
-            self.bounds[:, column],
+            self.error_bounds(column),
             rounding,
             self.tolerance,
             self.x_starts[column],

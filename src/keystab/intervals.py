@@ -222,24 +222,12 @@ def centred_interval(
 
     Parameters
     ----------
-    samples : ndarray, shape (n_resamples, ...)
-        A statistic of each resample; NaN where it does not exist.
+    samples, confidence
+        See `percentile_interval`, also for what is returned and raised.
     estimate : ndarray, shape (...)
         The statistic of the data, onto which the mean of the samples is shifted.
-    confidence : float
-        Between 0 and 1.
     limits : tuple of float
         Smallest and largest value that the statistic can have.
-
-    Returns
-    -------
-    low, high : ndarray, shape (...)
-        NaN where no sample exists.
-
-    Raises
-    ------
-    InputError
-        If `confidence` is not between 0 and 1.
 
     Examples
     --------

@@ -50,8 +50,7 @@ def stored_extrema(
             extrema_of_array(rows, tolerance - space.rounding / 2, (top - above.shape[1], 0))
         )
         above = rows[:, -2:].copy()
-    extrema = decided(space, np.concatenate(found), tolerance)
-    return extrema[np.lexsort((extrema[:, 2], extrema[:, 1], extrema[:, 0]))]
+    return decided(space, np.concatenate(found), tolerance)[0]
 
 
 def _require_same(store: StoredScaleSpace, space: ScaleSpace) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from keystab.detection import extrema_table, without_seams
 from keystab.dog_space import ScaleSpace, scale_space
-from keystab.extrema import discrete_extrema, within
+from keystab.extrema import extrema_and_cubes, within
 from keystab.refinement import positions, trace
 
 Window = tuple[float, float, float, float]
@@ -107,10 +107,10 @@ def detect_in_view(
     for octave, space in enumerate(detector.octaves(image)):
         asked = None if window is None else samples_of(window, space)
         if search:
-            found = within(search(space, octave), asked)
+            found = search(space, octave)
+            table = extrema_table(space, found[within(found, asked)])
         else:
-            found = discrete_extrema(space, detector.epsilon, window=asked)
-        table = extrema_table(space, found)
+            table = extrema_table(space, *extrema_and_cubes(space, detector.epsilon, window=asked))
         models = trace(space, table, detector.max_offset, detector.move, detector.scale_moves)
         models[["y", "x", "sigma"]] = positions(models, space.sampling)
         traces.append(models.drop(columns=["s", "row", "column"]))

@@ -151,5 +151,19 @@ def test_candidates_are_decided_one_by_one(texture):
     found = extrema.discrete_extrema(space)
     beside = found + [0, 0, 1, 0]
     candidates = np.concatenate([beside, found * [1, 1, 1, 0]])
-    decided = extrema.decided(space, candidates, space.rounding)
+    decided, _ = extrema.decided(space, candidates, space.rounding)
     np.testing.assert_array_equal(decided, found)
+
+
+@pytest.mark.parametrize("n_spo", [4, 15])  # evaluated everywhere, and interpolated
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
+def test_cubes_and_threads_change_no_digit(oversampling, n_spo):
+    image = np.random.default_rng(8).standard_normal((90, 120))
+    space = scale_space(image, 0.3, n_spo, oversampling=oversampling)
+    rows, columns = space.shape[1:]
+    window = (slice(rows // 9, rows - 5), slice(7, columns // 2))
+    found, cubes = extrema.extrema_and_cubes(space, threads=2, window=window)
+    np.testing.assert_array_equal(found, extrema.discrete_extrema(space, window=window))
+    assert len(found) > 5
+    np.testing.assert_array_equal(cubes, space.neighbourhoods(*found[:, :3].T))
+    assert extrema_table(space, found, cubes).equals(extrema_table(space, found))

@@ -295,35 +295,6 @@ rule crop_views:
         """
 
 
-rule noise_theory:
-    """Figure 12: noise of the difference of Gaussians against scale, in closed form."""
-    output:
-        table=f"{RESULTS}/tables/fig12_theory.csv",
-    log:
-        f"{LOGS}/noise_theory.log",
-    benchmark:
-        f"{LOGS}/benchmarks/noise_theory.tsv"
-    params:
-        camera_blur=blur_of_noisy_views,
-        sigma_min=setting("detector.sigma_min"),
-        kappa=setting("detector.kappa"),
-        n_oct=setting(f"sets.{SWEEPS['noise'][0].name}.n_oct"),
-        code=fingerprint("keystab.stages.noise_theory"),
-        software=SOFTWARE,
-    message:
-        "Computing the noise of the difference of Gaussians"
-    shell:
-        """
-        python -m keystab.stages.noise_theory \
-            --camera-blur {params.camera_blur} \
-            --sigma-min {params.sigma_min} \
-            --kappa {params.kappa} \
-            --n-oct {params.n_oct} \
-            --table {output.table:q} \
-            >{log:q} 2>&1
-        """
-
-
 rule match_blurs:
     """Figure S2: keypoints of views whose blur is not the assumed one."""
     input:

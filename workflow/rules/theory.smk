@@ -1,8 +1,9 @@
-"""What theory says of cameras and of blobs, without any picture (sections 2.3, 3.2 and 4).
+"""What theory says of cameras, blobs and noise, without any picture (sections 2.3, 3.2, 4 and 6.3).
 
-Comes in: settings. Goes out: {results}/tables/figS3*.csv and figS4.csv. Steps: the point spread
-functions of model cameras and the Gaussians nearest to them; Gaussian blobs of many sizes, the
-scales at which they are detected, and those that closed forms predict.
+Comes in: settings. Goes out: {results}/tables/figS3*.csv, figS4.csv and fig12_theory.csv. Steps:
+the point spread functions of model cameras and the Gaussians nearest to them; Gaussian blobs of
+many sizes, the scales at which they are detected, and those that closed forms predict; the noise
+of the difference of Gaussians.
 """
 
 
@@ -129,6 +130,35 @@ rule match_blobs:
             --traces {input.traces:q} \
             --max-offset {params.max_offset} \
             --max-iterations {params.max_iterations} \
+            --table {output.table:q} \
+            >{log:q} 2>&1
+        """
+
+
+rule noise_theory:
+    """Figure 12: noise of the difference of Gaussians against scale, in closed form."""
+    output:
+        table=f"{RESULTS}/tables/fig12_theory.csv",
+    log:
+        f"{LOGS}/noise_theory.log",
+    benchmark:
+        f"{LOGS}/benchmarks/noise_theory.tsv"
+    params:
+        camera_blur=blur_of_noisy_views,
+        sigma_min=setting("detector.sigma_min"),
+        kappa=setting("detector.kappa"),
+        n_oct=setting(f"sets.{SWEEPS['noise'][0].name}.n_oct"),
+        code=fingerprint("keystab.stages.noise_theory"),
+        software=SOFTWARE,
+    message:
+        "Computing the noise of the difference of Gaussians"
+    shell:
+        """
+        python -m keystab.stages.noise_theory \
+            --camera-blur {params.camera_blur} \
+            --sigma-min {params.sigma_min} \
+            --kappa {params.kappa} \
+            --n-oct {params.n_oct} \
             --table {output.table:q} \
             >{log:q} 2>&1
         """

@@ -24,7 +24,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.detection import extrema_table
     from keystab.dog_space import scale_space
-    from keystab.extrema import discrete_extrema
+    from keystab.extrema import extrema_and_cubes
     from keystab.stages._inputs import read_view
     from keystab.tables import write_table
 
@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             kappa=args.kappa,
             oversampling=args.oversampling,
         )
-        extrema = extrema_table(space, discrete_extrema(space, args.epsilon, show_progress=True))
+        extrema = extrema_table(space, *extrema_and_cubes(space, args.epsilon, show_progress=True))
         extrema.insert(0, "n_spo", args.n_spo)
         extrema.insert(1, "delta_min", delta_min)
         tables.append(extrema)

@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.detection import extrema_table
     from keystab.dog_space import scale_space
-    from keystab.extrema import discrete_extrema
+    from keystab.extrema import extrema_and_cubes
     from keystab.progress import progress
     from keystab.stages._inputs import read_view
     from keystab.tables import write_table
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             kappa=args.kappa,
             oversampling=args.oversampling,
         )
-        extrema = extrema_table(space, discrete_extrema(space, args.epsilon))
+        extrema = extrema_table(space, *extrema_and_cubes(space, args.epsilon))
         extrema.insert(0, "n_spo", n_spo)
         extrema.insert(1, "delta_min", space.sampling.delta_min)
         tables.append(extrema)
