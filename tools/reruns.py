@@ -388,6 +388,9 @@ def table(settings_effects: Mapping[str, Effect], code_effects: Mapping[str, Eff
 
 def main() -> int:
     """Write or check the table."""
+    if sys.argv[1:] not in ([], ["--check"]):
+        print(__doc__, file=sys.stderr)
+        return 2
     before, clock = plan(), Clock([], read_durations())
     written = table(effects_of_settings(before, clock), effects_of_code(before, clock))
     text = PAGE.read_text()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 
-@pytest.mark.parametrize("name", ["interrupted", "rule_graph", "study"])
+@pytest.mark.parametrize("name", ["interrupted", "overheads", "rule_graph", "study"])
 def test_examples_of_tools(name, monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parents[2] / "tools")
     failed, tried = doctest.testmod(importlib.import_module(name))
