@@ -350,6 +350,7 @@ def _check_inputs(
     records: Mapping[str, Record], project: Path, left_out: Mapping[str, str] | None = None
 ) -> Check:
     """Hold files against the digests that they had when others were made from them."""
+    again = "; `make {0}` makes it again" if left_out is None else ""
     left_out = left_out or {}
     digests: dict[str, set[str]] = {}
     for record in records.values():
@@ -362,7 +363,7 @@ def _check_inputs(
         elif name in left_out:
             found = left_out[name]
         else:
-            problems.append(f"{name}: missing")
+            problems.append(f"{name}: missing" + again.format(name))
             continue
         if {found} != expected:
             problems.append(f"{name}: not as it was when others were made from it")

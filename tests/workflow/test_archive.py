@@ -262,6 +262,10 @@ def test_results_that_are_here_are_checked_down_to_the_chunk(here, monkeypatch, 
     assert "results/views/still: b is damaged" in said
     assert "results/keypoints/still.csv: not as it was when others were made from it" in said
     assert "NOT verified" in said
+    (here.project / "results/keypoints/still.csv").unlink()  # Snakemake does not miss it
+    assert cli.main(["verify"]) == 1
+    again = "results/keypoints/still.csv: missing; `make results/keypoints/still.csv` makes it again"
+    assert again in capsys.readouterr().out
 
 
 def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp_path):
