@@ -264,7 +264,9 @@ def test_results_that_are_here_are_checked_down_to_the_chunk(here, monkeypatch, 
     assert "NOT verified" in said
     (here.project / "results/keypoints/still.csv").unlink()  # Snakemake does not miss it
     assert cli.main(["verify"]) == 1
-    again = "results/keypoints/still.csv: missing; `make results/keypoints/still.csv` makes it again"
+    again = (
+        "results/keypoints/still.csv: missing; `make results/keypoints/still.csv` makes it again"
+    )
     assert again in capsys.readouterr().out
 
 
