@@ -117,7 +117,8 @@ def extrema_and_cubes(
             ]
             found += [task.result() for task in tasks]
     extrema, cubes = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    # Columns of blocks may overlap by the samples that have no neighbours in one of them.
+    found.clear()
+    # Blocks may overlap by the samples that have no neighbours in one of them.
     extrema, first = np.unique(extrema, axis=0, return_index=True)
     inside = within(extrema, window)
     return extrema[inside], cubes[first[inside]]
@@ -148,20 +149,20 @@ def within(extrema: np.ndarray, window: tuple[slice, slice] | None) -> np.ndarra
 def _searches(
     space: ScaleSpace, tolerance: float, pool: ThreadPoolExecutor, window: tuple[slice, slice]
 ) -> Iterator[tuple[Callable[[Any], np.ndarray], Sequence[Any]]]:
-    """What finds the candidates of a column of blocks, and the columns; large images take turns."""
-    few: InterpolatedSearch | BandLimitedSearch | None = None
-    if interpolated_search.applies(space):
-        few = InterpolatedSearch(space, tolerance, *window)
-    elif band_limited_search.applies(space):
-        few = BandLimitedSearch(space, tolerance, *window)
-    if few is not None:
-        yield partial(_interpolated, few), range(few.n_columns)
-        return
+    """What finds the candidates of a column of blocks, and the columns, band by band."""
     columns = list(ranges(window[1].start, window[1].stop, BLOCK_COLUMNS))
     for top, bottom in ranges(window[0].start, window[0].stop, BAND_ROWS):
-        rows = list(ranges(top, bottom, BLOCK_ROWS))
-        along = list(pool.map(lambda r: space.axes[0].block(r[0] - 1, r[1] + 1), rows))
-        yield partial(_evaluated, space, rows, along, tolerance), columns
+        few: InterpolatedSearch | BandLimitedSearch
+        if interpolated_search.applies(space):
+            few = InterpolatedSearch(space, tolerance, slice(top, bottom), window[1])
+            yield partial(_interpolated, few), range(few.n_columns)
+        elif band_limited_search.applies(space):
+            few = BandLimitedSearch(space, tolerance, slice(top, bottom), window[1])
+            yield partial(_interpolated, few), range(few.n_columns)
+        else:
+            rows = list(ranges(top, bottom, BLOCK_ROWS))
+            along = list(pool.map(lambda r: space.axes[0].block(r[0] - 1, r[1] + 1), rows))
+            yield partial(_evaluated, space, rows, along, tolerance), columns
 
 
 def _interpolated(search: InterpolatedSearch | BandLimitedSearch, column: int) -> np.ndarray:

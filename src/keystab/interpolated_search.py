@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from keystab.block_rows import axis_blocks, expansion, whole_rows
+from keystab.block_rows import AxisBlocks, axis_blocks, expansion, whole_rows
 from keystab.block_scan import ROOM, SINGLE_ROUNDING, difference, gathered, scan, starts_of
 from keystab.dog_space import ScaleSpace
 from keystab.operators import SplineAxis
@@ -38,9 +38,6 @@ _ABREAST = 6
 
 # Fewer samples than this per block gain nothing against evaluating all of them.
 _LEAST = 24
-
-# From this blur on, in pixels, the interpolation errs so little that its bound need not be local.
-_SMOOTH = 1.3
 
 # Slices whose lower Gaussian has a smaller blur, in pixels, show the kinks of the spline, which no
 # polynomial follows: they are evaluated at all samples.
@@ -67,25 +64,48 @@ def block_length(space: ScaleSpace) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _local_maxima(values, y_blocks, x_blocks, column, n_blurs):
-    """Largest value that each block of one column meets at the first blurs, 0 if none."""
-    maxima = np.zeros((n_blurs, y_blocks.start.size))
-    across = np.empty(values.shape[0])
-    group = slice(column * _ABREAST, (column + 1) * _ABREAST)
+def _local_maxima(source, y_blocks, x_blocks):
+    r"""Largest \|C\|, \|Delta^4 C\| along y and along x that each block of one column meets.
+
+    Returns an array of shape (3, n_blurs, n_y_blocks). What a block meets at one blur it meets at
+    the next, larger one as well.
+    """
+    n_blurs, n_y = y_blocks.first.shape[1], y_blocks.start.size
+    maxima = np.zeros((3, n_blurs, n_y))
+    across = np.zeros((3, source.shape[0]))
+    left = right = x_blocks.first[:, 0].min()
     for blur in range(n_blurs):
-        first = x_blocks.first[group, blur]
-        left = first.min()
-        right = min((first + x_blocks.width[group, blur]).max(), values.shape[1])
-        for y in range(across.size):
-            largest = 0.0
-            for x in range(left, right):
-                largest = max(largest, values[y, x])
-            across[y] = largest
-        for i in range(y_blocks.start.size):
+        first = x_blocks.first[:, blur]
+        last = (first + x_blocks.width[:, blur]).max()
+        _widen(source, first.min(), left, across)
+        _widen(source, right, last, across)
+        left, right = min(left, first.min()), max(right, last)
+        for i in range(n_y):
             top = y_blocks.first[i, blur]
-            for y in range(top, min(top + y_blocks.width[i, blur], across.size)):
-                maxima[blur, i] = max(maxima[blur, i], across[y])
+            bottom = min(top + y_blocks.width[i, blur], source.shape[0])
+            for kind in range(3):
+                largest = 0.0
+                for y in range(top, bottom):
+                    largest = max(largest, across[kind, y])
+                maxima[kind, blur, i] = largest
     return maxima
+
+
+@njit(cache=True, nogil=True)
+def _widen(source, left, right, across):
+    """Take columns of the source into the maxima of its rows."""
+    height, width = source.shape
+    for y in range(height):
+        for x in range(left, min(right, width)):
+            across[0, y] = max(across[0, y], abs(source[y, x]))
+            if y + 4 < height:
+                along_y = source[y, x] - 4 * source[y + 1, x] + 6 * source[y + 2, x]
+                along_y += source[y + 4, x] - 4 * source[y + 3, x]
+                across[1, y] = max(across[1, y], abs(along_y))
+            if x + 4 < width:
+                along_x = source[y, x] - 4 * source[y, x + 1] + 6 * source[y, x + 2]
+                along_x += source[y, x + 4] - 4 * source[y, x + 3]
+                across[2, y] = max(across[2, y], abs(along_x))
 
 
 class InterpolatedSearch:
@@ -107,47 +127,44 @@ class InterpolatedSearch:
         y_axis, x_axis = space.axes
         assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
         self.abreast = _ABREAST * length
+        self.x_axis, self.x_starts = x_axis, starts_of(columns, space.shape[2], self.abreast)
         y_starts = starts_of(rows, space.shape[1], length)
-        self.x_starts = starts_of(columns, space.shape[2], self.abreast)
-        each = tuple(start + k * length for start in self.x_starts for k in range(_ABREAST))
-        self.y_blocks = axis_blocks(y_axis, y_starts, length)
-        self.x_blocks = axis_blocks(x_axis, each, length)
-        source = space.source
-        # What the bounds are made of: the source, and its fourth differences along each axis.
-        self.parts = [np.abs(source), *(np.abs(np.diff(source, 4, axis=axis)) for axis in (0, 1))]
-        self.largest = [float(part.max(initial=0.0)) for part in self.parts]
+        y_blocks = axis_blocks(y_axis, y_starts, length)
+        # Only the rows of the source that the blocks see are held for a column.
+        top, bottom = y_blocks.first.min(), (y_blocks.first + y_blocks.width).max()
+        self.source = space.source[top:bottom]
+        self.y_blocks = y_blocks._replace(first=y_blocks.first - top)
         blurs, lower, upper = space.blurs
         self.n_kinked = int((blurs[lower] < _KINKED).sum())  # the first slices
         kinked = np.unique([lower[: self.n_kinked], upper[: self.n_kinked]])
         self.kinked = tuple(int(blur) for blur in kinked)
         every = whole_rows(y_axis, y_starts, length, self.kinked)
-        self.y_rows = every._replace(entries=every.entries.astype(np.float32))
-        self.x_rows = whole_rows(x_axis, self.x_starts, self.abreast, self.kinked)
+        self.y_rows = every._replace(
+            first=every.first - top, entries=every.entries.astype(np.float32)
+        )
 
     @property
     def n_columns(self) -> int:
         """Columns of blocks."""
         return len(self.x_starts)
 
-    def error_bounds(self, column: int) -> NDArray[np.float64]:
+    def x_blocks(self, column: int) -> AxisBlocks:
+        """Rows of the blocks that lie abreast in one column of blocks."""
+        left, length = self.x_starts[column], self.length
+        return axis_blocks(self.x_axis, tuple(range(left, left + self.abreast, length)), length)
+
+    def error_bounds(self, x_blocks: AxisBlocks) -> NDArray[np.float64]:
         """Bound of the interpolation error of every block of a column, and of every slice.
 
         Returns
         -------
         ndarray, shape (n_y_blocks, n_slices)
         """
-        blurs, lower, upper = self.space.blurs
-        y_blocks, x_blocks = self.y_blocks, self.x_blocks
-        n_local = int(np.searchsorted(blurs, _SMOOTH))  # blurs ascend
-        level, along_y, along_x = (
-            np.repeat(largest, blurs.size * y_blocks.start.size).reshape(blurs.size, -1)
-            for largest in self.largest
-        )
-        for part, maxima in zip(self.parts, (level, along_y, along_x), strict=True):
-            maxima[:n_local] = _local_maxima(part, y_blocks, x_blocks, column, n_local)
-        group = slice(column * _ABREAST, (column + 1) * _ABREAST)
+        _, lower, upper = self.space.blurs
+        y_blocks = self.y_blocks
+        level, along_y, along_x = _local_maxima(self.source, y_blocks, x_blocks)
         smooth, rough, norm = (
-            of_blocks[group].max(axis=0)[:, None]
+            of_blocks.max(axis=0)[:, None]
             for of_blocks in (x_blocks.smooth, x_blocks.rough, x_blocks.norm)
         )
         e_y = y_blocks.smooth.T * along_y + y_blocks.rough.T * level
@@ -157,23 +174,24 @@ class InterpolatedSearch:
 
     def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[int, int]]]:
         """Samples of one column of blocks that may be extrema; see `block_scan.gathered`."""
-        space, blocks = self.space, self.x_blocks
-        _, lower, upper = space.blurs
+        source, blocks = self.source, self.x_blocks(column)
+        _, lower, upper = self.space.blurs
         nodes, expand = expansion(self.length)
-        group = range(column * _ABREAST, (column + 1) * _ABREAST)
         n_blurs = blocks.first.shape[1]
-        source = space.source
         strips = np.zeros((n_blurs, source.shape[0], _ABREAST * nodes.size))
         for blur in range(n_blurs):
-            for k, block in enumerate(group):
+            for block in range(_ABREAST):
                 width, start = blocks.width[block, blur], blocks.offset[block, blur]
                 rows = blocks.entries[start : start + nodes.size * width].reshape(-1, width)
                 left = blocks.first[block, blur]
-                part = strips[blur, :, k * nodes.size : (k + 1) * nodes.size]
+                part = strips[blur, :, block * nodes.size : (block + 1) * nodes.size]
                 np.matmul(source[:, left : left + width], rows.T, out=part)
         whole = np.zeros((len(self.kinked), source.shape[0], self.abreast), dtype=np.float32)
+        every = whole_rows(
+            self.x_axis, self.x_starts[column : column + 1], self.abreast, self.kinked
+        )
         for k in range(len(self.kinked)):
-            rows, left = self.x_rows.rows(column, k)
+            rows, left = every.rows(0, k)
             whole[k] = source[:, left : left + rows.shape[1]] @ rows.T
         single = expand.astype(np.float32)
         found = np.empty((self.y_blocks.start.size, ROOM, 4), dtype=np.int64)
@@ -196,7 +214,7 @@ class InterpolatedSearch:
             np.searchsorted(self.kinked, upper[: self.n_kinked]),
             single,
             np.ascontiguousarray(single.T),
-            self.error_bounds(column),
+            self.error_bounds(blocks),
             rounding,
             self.tolerance,
             self.x_starts[column],

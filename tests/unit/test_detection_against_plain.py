@@ -157,7 +157,7 @@ def test_candidates_are_decided_one_by_one(texture):
 
 @pytest.mark.parametrize("n_spo", [4, 15])  # evaluated everywhere, and interpolated
 @pytest.mark.parametrize("oversampling", ["spline", "cosine"])
-def test_cubes_and_threads_change_no_digit(oversampling, n_spo):
+def test_cubes_threads_and_bands_change_no_digit(oversampling, n_spo, monkeypatch):
     image = np.random.default_rng(8).standard_normal((90, 120))
     space = scale_space(image, 0.3, n_spo, oversampling=oversampling)
     rows, columns = space.shape[1:]
@@ -167,3 +167,5 @@ def test_cubes_and_threads_change_no_digit(oversampling, n_spo):
     assert len(found) > 5
     np.testing.assert_array_equal(cubes, space.neighbourhoods(*found[:, :3].T))
     assert extrema_table(space, found, cubes).equals(extrema_table(space, found))
+    monkeypatch.setattr(extrema, "BAND_ROWS", 100)
+    np.testing.assert_array_equal(found, extrema.discrete_extrema(space, window=window))

@@ -95,12 +95,14 @@ def test_a_constant_picture_has_none():
 def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
     space = scale_space(scene(kind), 1.1, n_spo)
     search = InterpolatedSearch(space, 0.0, *extrema.inner_window(space))
-    bounds = [search.error_bounds(column) for column in range(search.n_columns)]
+    blocks = [search.x_blocks(column) for column in range(search.n_columns)]
+    bounds = [search.error_bounds(abreast) for abreast in blocks]
+    lefts = np.concatenate([abreast.start for abreast in blocks])
     dog = space.window()
     nodes, expand = expansion(search.length)
     reached = 0.0
     for i, top in enumerate(search.y_blocks.start):
-        for j, left in enumerate(search.x_blocks.start):
+        for j, left in enumerate(lefts):
             box = dog[:, top : top + search.length, left : left + search.length]
             interpolated = expand @ box[:, nodes][:, :, nodes] @ expand.T
             off = np.abs(interpolated - box).max(axis=(1, 2))
