@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 import small_study
-from project import forked
+from project import QUICK, forked
 
 from keystab import archive, cli, provenance, recomputation, verification
 from keystab.errors import InputError
@@ -408,3 +408,19 @@ def test_the_real_study_is_finished_without_its_intermediate_files(touched, tmp_
         assert not (folder / "results/quick/keypoints").exists()
         check = verification._check_nothing_to_do(folder, about, touched.folder)
     assert check.problems == []
+
+
+@pytest.mark.parametrize(
+    ("table", "rule"),
+    [
+        ("fig5_auc.csv", "score_features"),  # is drawn
+        ("fig5_features.csv", "score_features"),  # is drawn by no figure
+        ("predictors_detections.parquet", "score_predictors"),
+        ("refinement.csv", "count_refined"),
+    ],
+)
+def test_a_lost_table_that_cannot_be_packed_is_made_again(finished, table, rule):
+    (finished.folder / "results/quick/tables" / table).unlink()
+    with pytest.raises(InputError, match=r"finish the study first \(make study\)"):
+        archive.Contents.of(Study(finished.folder, ["config/quick.yaml"]))
+    assert finished.would_run(*QUICK)[rule] == 1

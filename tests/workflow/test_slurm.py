@@ -1,4 +1,4 @@
-"""The study on a real Slurm of one node: jobs get time and memory for their work, and its bytes."""
+"""Jobs ask for time and memory by their work; on a real Slurm of one node they give its bytes."""
 
 from __future__ import annotations
 
@@ -13,8 +13,16 @@ from pathlib import Path
 import pytest
 from project import QUICK, ROOT, Project, copy_of_project
 
+from keystab import seals
+
 ONE_NODE = ROOT / "tests/slurm/one_node.sh"
+STORE = "results/quick/scale_space/n3"
+SEAL = f"{STORE}.sha256"
+EXTREMA = "results/quick/keypoints/sampling_n3.parquet"
 TARGETS = [
+    SEAL,
+    EXTREMA,
+    "results/quick/keypoints/traces_n3.parquet",
     "results/quick/keypoints/grid_n10.parquet",
     "results/quick/tables/fig1.csv",
     "figures/quick/fig1.png",
@@ -25,8 +33,6 @@ IMPATIENT = [
     *("--slurm-init-seconds-before-status-checks", "2"),
     *("--seconds-between-status-checks", "2"),
 ]
-
-pytestmark = pytest.mark.slow
 
 
 def obstacle() -> str | None:
@@ -58,13 +64,28 @@ def files(project: Project) -> list[bytes]:
     return [(project.folder / target).read_bytes() for target in TARGETS]
 
 
-def test_jobs_of_every_kind_through_slurm(slurm, tmp_path):
+def test_what_store_jobs_ask_for_grows_with_the_picture(tmp_path):
+    project = copy_of_project(tmp_path / "project", own_library=False)
+    project.edit("config/quick.yaml", "still: { step: 25 }", "still: { step: 2 }")
+    asked = "asks for {resources.runtime} min, {resources.mem_mb} MB"
+    project.edit("workflow/rules/scale_space.smk", "Storing the balanced", f"Writing {asked}")
+    project.edit("workflow/rules/detect.smk", "Detecting extrema at the", f"Reading {asked}")
+    status, said = project.dry_run(*QUICK, "--", EXTREMA)
+    assert status == 0, said
+    # 1125 x 2000 pixels, 3 scales per octave, 15 microseconds each: 101 s, 2 minutes and 5 more;
+    # three copies of 128 rows of 5 slices of 2000 x 3 doubles, 92.2 MB, and 600
+    assert "Writing asks for 7 min, 693 MB" in said
+    assert "Reading asks for 7 min, 693 MB" in said
+
+
+@pytest.mark.slow
+def test_jobs_through_slurm(slurm, tmp_path):
     project = copy_of_project(tmp_path / "submitted", own_library=False)
     logs = ("--slurm-logdir", str(tmp_path / "logs"))
     arguments = ["--profile", "profiles/slurm", *IMPATIENT, *logs, *QUICK, "--", *TARGETS]
     run = project.snakemake(*arguments)
     assert run.returncode == 0, run.stdout
-    assert run.stdout.count("has been submitted with SLURM jobid") == 4
+    assert run.stdout.count("has been submitted with SLURM jobid") == 6
 
     shown = subprocess.run(
         ["scontrol", "--oneliner", "show", "jobs"], capture_output=True, text=True
@@ -79,8 +100,15 @@ def test_jobs_of_every_kind_through_slurm(slurm, tmp_path):
     assert asked["simulate"] == ["00:15:00", "1", "1320M"]  # ten copies of 2250 x 4000 doubles more
     # 3 steps of the grid, 90 x 160 pixels, 10 scales per octave, 15 microseconds each: 7 s
     assert asked["detect_grid"] == ["00:06:00", "1", "1000M"]
+    # one step, 3 scales per octave: 0.6 s; and three copies of 128 rows of 5 slices of 160 x 3
+    # doubles, 7.4 MB, above 600 of Python
+    assert asked["scale_space"] == ["00:06:00", "1", "608M"]
+    assert asked["detect_stored"] == ["00:06:00", "1", "608M"]
 
     local = copy_of_project(tmp_path / "local", own_library=False)
     run = local.snakemake(*QUICK, "--", *TARGETS)
     assert run.returncode == 0, run.stdout
     assert files(project) == files(local)
+    # The seals are equal; each holds for the chunks of its own store.
+    for one in (project, local):
+        seals.verify(one.folder / STORE, one.folder / SEAL)
