@@ -343,6 +343,18 @@ def test_figure_7_shows_sift_as_shipped_beside_the_usual_refinement():
     assert_array_equal(line(ax, "as in (a)")[1], usual["percentage_of_unique"])
 
 
+def test_figure_7_draws_a_picture_of_which_sift_keeps_nothing():
+    tables = figure_tables.tables(7)
+    shipped = tables["fig7_shipped"].copy()
+    nothing = shipped["shipped"] == "filtered"
+    shipped.loc[nothing, ["percentage_of_unique", "low", "high"]] = np.nan
+    shipped.loc[nothing, "n_unique"] = 0
+    figure = fig7.draw(tables | {"fig7_shipped": shipped})
+    written = [text.get_text() for text in panel(figure, "f").texts]
+    assert "filtered" in written
+    assert "0 of 0" in written
+
+
 def test_figure_7_names_curves_that_are_missing():
     tables = figure_tables.tables(7)
     curves, shipped = tables["fig7_curves"], tables["fig7_shipped"]

@@ -69,14 +69,16 @@ def curve(
     Returns
     -------
     EndLabel
-        With the counts "seen in all views of seen in any", for example "191 of 420".
+        With the counts "seen in all views of seen in any", for example "191 of 420". A curve of
+        no keypoints has no percentages; its name stands at 0.
     """
     rows = rows.sort_values("percentage_of_images")
     share, percentage = (rows[column].to_numpy(dtype=np.float64) for column in CURVE[:3:2])
     ax.fill_between(share, rows["low"], rows["high"], color=colour, alpha=band, linewidth=0)
     ax.plot(share, percentage, color=colour, label=name, **({"zorder": 3} | line))
     unique = rows["n_unique"].astype(int)
-    return EndLabel(percentage[-1], name, f"{unique.iloc[-1]} of {unique.iloc[0]}", colour)
+    end = percentage[-1] if np.isfinite(percentage[-1]) else 0.0
+    return EndLabel(end, name, f"{unique.iloc[-1]} of {unique.iloc[0]}", colour)
 
 
 def end_labels(
