@@ -13,7 +13,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -56,6 +56,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except InputError as error:
         return _refuse(args, str(error))
+    except RuntimeError as error:
+        if "no locator available" not in str(error):  # how numba says it
+            raise
+        return _refuse(
+            args,
+            f"compiled code can be kept neither in {Path(__file__).parent} nor in the home folder; "
+            "set the environment variable NUMBA_CACHE_DIR to a folder that can be written to",
+        )
     except MemoryError:
         return _refuse(args, "the memory does not suffice; use a smaller picture or coarser steps")
     except BrokenPipeError:  # whoever read the output has seen enough
@@ -76,17 +84,20 @@ def simulate(args: argparse.Namespace) -> None:
     """Take a view of a picture with the simulated camera and write it."""
     from keystab.camera import Scene, ViewSpec
     from keystab.camera import simulate as take
+    from keystab.checks import number
     from keystab.files import check_writable
     from keystab.pictures import FORMATS, read_picture, write_picture
 
     check_writable(args.out, FORMATS)
+    if args.picture.exists() and args.out.exists() and args.out.samefile(args.picture):
+        raise InputError(f"{args.out} is the picture itself; give another name to the view")
     # Bad values are refused before the picture is read, which also decides the default shape.
     spec = ViewSpec(
         args.blur,
         args.step,
         tuple(args.shape or (1, 1)),
         tuple(args.shift),
-        math.radians(args.rotation),
+        math.radians(number("rotation", args.rotation)),
         args.noise,
         args.seed,
     )
@@ -207,9 +218,12 @@ def reference(args: argparse.Namespace) -> None:
 def verify(args: argparse.Namespace) -> int:
     """Check an archive, or the results that are here; recompute figures on request."""
     from keystab import recomputation, verification
+    from keystab.checks import integer, number
     from keystab.provenance import file_digest
     from keystab.workflow import Study, find_project
 
+    integer("cores", args.cores, least=1)  # Snakemake waits for ever for the first of none
+    rtol, atol = (number(name, getattr(args, name), least=0) for name in ("rtol", "atol"))
     project = find_project()
     start = time.monotonic()
     if args.archive is None:
@@ -223,7 +237,7 @@ def verify(args: argparse.Namespace) -> int:
     if args.recompute:
         with _run_to_compare(args.archive, project) as source:
             checks, same = recomputation.recompute(
-                source, project, args.recompute, args.cores, args.rtol, args.atol
+                source, project, args.recompute, args.cores, rtol, atol
             )
         print(f"recomputed {' '.join(args.recompute)}\n{verification.report(checks)}")
         sound = sound and same
@@ -264,7 +278,8 @@ def _parser() -> argparse.ArgumentParser:
             "simulate",
             help="take a view of a picture with a simulated camera",
             description="Blur a picture and sample it, as a camera that sees it would: exactly, "
-            "at any zoom, shift and rotation. The view is centred on the picture.",
+            "at any zoom, shift and rotation. The view is centred on the picture, which goes on beyond "
+            "its border as its mirror image.",
         )
     )
     _detect_arguments(
@@ -437,7 +452,7 @@ def _detect_arguments(to: argparse.ArgumentParser) -> None:
             help="largest accepted offset of a model, grid steps; inf for no limit",
         ),
         to.add_argument(
-            "--max-iterations", type=float, default=2, metavar="N",
+            "--max-iterations", type=_count, default=2, metavar="N",
             help="most models for one extremum; inf for no limit",
         ),
         to.add_argument(
@@ -505,6 +520,14 @@ def _truth_arguments(to: argparse.ArgumentParser) -> None:
         to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
     ]  # fmt: skip
     to.set_defaults(parameters=[flag.dest for flag in flags], output=None)
+
+
+def _count(text: str) -> float:
+    with suppress(ValueError):
+        value = float(text)
+        if value.is_integer() or not math.isfinite(value):  # the library judges these
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} is no whole number; give one, or inf for no limit")
 
 
 def _seed(text: str) -> int | str:

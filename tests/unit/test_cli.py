@@ -3,8 +3,11 @@
 import inspect
 import io
 import math
+import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -163,6 +166,8 @@ BLUR = "--camera-blur 0.8"
         (f"detect PICTURE {BLUR} --epsilon -1", "epsilon is -1"),
         (f"detect PICTURE {BLUR} --max-offset 0", "max_offset is 0"),
         (f"detect PICTURE {BLUR} --max-iterations nan", "max_iterations is nan"),
+        (f"detect PICTURE {BLUR} --max-iterations 2.5", "'2.5' is no whole number"),
+        (f"detect PICTURE {BLUR} --max-iterations few", "'few' is no whole number"),
         ("detect PICTURE --camera-blur 1.2", "sigma_min is 1.1"),
         ("detect PICTURE --camera-blur nan", "camera_blur is nan"),
         ("simulate PICTURE view.jpg --blur 1 --step 2", "cannot write '.jpg'"),
@@ -172,6 +177,8 @@ BLUR = "--camera-blur 0.8"
         ("simulate PICTURE view.png --blur 1 --step 1000", "smaller step or a shape"),
         ("simulate PICTURE view.png --blur 1 --step 2 --shape 0 4", "shape is (0, 4)"),
         ("simulate PICTURE view.png --blur 1 --step 2 --noise 0.1", "seed"),
+        ("simulate PICTURE view.png --blur 1 --step 2 --rotation inf", "rotation is inf"),
+        ("simulate PICTURE PICTURE --blur 1 --step 2", "is the picture itself"),
         ("simulate PICTURE PICTURE/view.png --blur 1 --step 2", "blob.npy is no folder"),
         (f"detect PICTURE {BLUR} -o PICTURE/found.csv", "blob.npy is no folder"),
         ("blur gone.png", "gone.png: no such file"),
@@ -183,6 +190,9 @@ BLUR = "--camera-blur 0.8"
         (f"truth PICTURE {BLUR} --sigma-max 1", "sigma_max is 1"),
         (f"truth PICTURE {BLUR} -o truth.txt", "cannot write '.txt'; use .csv or .parquet"),
         ("inspect gone", "gone: no such file"),
+        ("verify --cores 0", "cores is 0"),
+        ("verify --rtol -1", "rtol is -1"),
+        ("verify --atol nan", "atol is nan"),
         ("inspect PICTURE", "ends in .csv or .parquet"),
         ("inspect .", "no store of keystab here"),
     ],
@@ -249,6 +259,26 @@ def test_blur_names_the_picture_that_it_cannot_fit(tmp_path, capsys, values, wor
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1
     assert "psf.npy: " in err and words in err
+
+
+def test_compiled_code_that_can_be_kept_nowhere_gets_one_line(picture, tmp_path):
+    # As in a container that runs for a user who may write neither to the package nor to a home.
+    source = Path(cli.__file__).parent
+    package = tmp_path / "library" / "keystab"
+    shutil.copytree(source, package, ignore=shutil.ignore_patterns("__pycache__"))
+    (package / "__pycache__").write_text("no folder")
+    nowhere = {"HOME": str(picture), "XDG_CACHE_HOME": str(picture)}
+    environment = {name: os.environ[name] for name in os.environ if name != "NUMBA_CACHE_DIR"}
+    command = [sys.executable, "-m", "keystab.cli", "detect", str(picture), "--camera-blur", "0.8"]
+    ended = subprocess.run(
+        command,
+        env=environment | nowhere | {"PYTHONPATH": str(package.parent)},
+        capture_output=True,
+        text=True,
+    )
+    assert ended.returncode == 2
+    assert "set the environment variable NUMBA_CACHE_DIR" in ended.stderr
+    assert ended.stderr.count("\n") == 1
 
 
 def test_one_keypoint_is_singular(picture, tmp_path, monkeypatch, capsys):
