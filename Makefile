@@ -11,6 +11,8 @@ export PATH := $(CURDIR)/.venv/bin:$(PATH)
 SNAKEMAKE = python tools/study.py --cores $(CORES)
 OVERLAY = $(if $(WITH),--configfile $(WITH))
 QUICK = --configfile config/quick.yaml
+NO_WITH = $(if $(WITH),$(error drafts are of the default picture; for one of yours give folders \
+    of their own in $(WITH) and type: make study WITH="config/quick.yaml $(WITH)"))
 
 .DEFAULT_GOAL := help
 .PHONY: help study quick report archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
@@ -26,10 +28,10 @@ study: environment ## The whole study
 	$(SNAKEMAKE) $(OVERLAY)
 
 quick: environment ## Every figure in draft form, in some minutes
-	$(SNAKEMAKE) $(QUICK)
+	$(NO_WITH)$(SNAKEMAKE) $(QUICK)
 
 figures/quick/% results/quick/%: environment FORCE
-	$(SNAKEMAKE) $@ $(QUICK)
+	$(NO_WITH)$(SNAKEMAKE) $@ $(QUICK)
 
 figures/% results/%: environment FORCE
 	$(SNAKEMAKE) $@ $(OVERLAY)

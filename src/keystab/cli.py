@@ -278,8 +278,8 @@ def _parser() -> argparse.ArgumentParser:
             "simulate",
             help="take a view of a picture with a simulated camera",
             description="Blur a picture and sample it, as a camera that sees it would: exactly, "
-            "at any zoom, shift and rotation. The view is centred on the picture, which goes on beyond "
-            "its border as its mirror image.",
+            "at any zoom, shift and rotation. The view is centred on the picture, which goes on "
+            "beyond its border as its mirror image.",
         )
     )
     _detect_arguments(

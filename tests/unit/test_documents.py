@@ -6,6 +6,7 @@ import contextlib
 import io
 import re
 import shlex
+import subprocess
 from itertools import takewhile
 from pathlib import Path
 
@@ -86,19 +87,27 @@ def test_make_targets_exist(document):
     commands = re.findall(r"`make ([^`]+)`", prose(document))
     commands += re.findall(r"^make (.+)$", "\n".join(blocks(document, "sh")), re.MULTILINE)
     for command in commands:
-        words = takewhile(lambda word: word != "#", command.split())
+        words = takewhile(lambda word: word != "#", shlex.split(command))
         for word in words:
             if "=" in word:
                 assert word.split("=")[0] in makefile, command
-                if word.startswith("WITH=config"):
-                    path = word.removeprefix("WITH=")
-                    assert (
-                        ROOT / path.replace("NAME", EXAMPLES.get(path.split("/")[1], ""))
-                    ).exists()
+                for path in word.removeprefix("WITH=").split():
+                    if path.startswith("config"):
+                        place = path.replace("NAME", EXAMPLES.get(path.split("/")[1], ""))
+                        assert (ROOT / place).exists()
             else:
                 assert word in targets or any(
                     word.startswith(target) for target in targets if target.endswith("/")
                 ), command
+
+
+@pytest.mark.parametrize("target", ["quick", "figures/quick/fig1.pdf"])
+def test_a_draft_of_another_picture_is_not_that_of_the_default_one(target):
+    # It would be, without a word, since the settings of the draft name its folders.
+    command = ["make", "--dry-run", target, "WITH=my.yaml"]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert ended.returncode == 2
+    assert 'make study WITH="config/quick.yaml my.yaml"' in ended.stderr
 
 
 def test_settings_of_deviations_exist():
