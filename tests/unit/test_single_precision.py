@@ -81,19 +81,21 @@ def test_settled_rates_are_weighted_by_their_detections():
     assert np.isnan(floor_summary(COUNTS, pd.Series([], dtype=float), 99)["new_rate"].item())
 
 
-def test_the_figure_shows_every_variant():
-    names = ["usual", "epsilon_1e6", "of_my_own"]
+def figure_floor_tables(names):
     rates = [
         {"variant": name, "n_spo": n, "new_rate": r, "new_low": r / 2, "new_high": 2 * r}
         for name in names
         for n, r in ((3, np.nan), (9, 0.1), (15, 0.05))
     ]
     summary = floor_summary(COUNTS, pd.Series([1.0, 0.2]), 14)
-    tables = {
+    return {
         "floor_rates": pd.DataFrame(rates),
         "floor_summary": pd.concat([summary.assign(variant=name) for name in names]),
     }
-    figure = floor.draw(tables)
+
+
+def test_the_figure_shows_every_variant():
+    figure = floor.draw(figure_floor_tables(["usual", "epsilon_1e6", "of_my_own"]))
     panels = {ax.get_label(): ax for ax in figure.axes}
     assert set(panels) == {"a", "b", "c"}
     labels = [text.get_text() for text in panels["b"].get_yticklabels()]
@@ -101,3 +103,13 @@ def test_the_figure_shows_every_variant():
     lines = {line.get_label(): line for line in panels["a"].lines}
     assert lines["usual"].get_ydata().tolist() == [10.0, 5.0]
     assert "of_my_own" not in lines
+
+
+def test_the_figure_leaves_out_a_tolerance_that_no_extremum_exceeds():
+    tables = figure_floor_tables(["usual", "epsilon_1e6"])
+    rates = tables["floor_rates"]
+    nothing = rates["variant"] == "epsilon_1e6"
+    rates.loc[nothing, ["new_rate", "new_low", "new_high"]] = np.nan
+    (panel,) = (ax for ax in floor.draw(tables).axes if ax.get_label() == "a")
+    labels = {line.get_label() for line in panel.lines}
+    assert "usual" in labels and "epsilon_1e6" not in labels

@@ -96,6 +96,8 @@ def _draw_rates(ax: Axes, rates: DataFrame) -> None:
     for name in shown:
         colour = palette.TOLERANCE_COLOURS[name]
         rows = rates[(rates["variant"] == name) & rates["new_rate"].notna()].sort_values("n_spo")
+        if rows.empty:  # a picture so soft that no extremum exceeds this tolerance
+            continue
         n_spo = rows["n_spo"].to_numpy()
         rate, low, high = (100 * rows[f"new_{part}"].to_numpy() for part in ("rate", "low", "high"))
         ax.fill_between(n_spo, low, high, color=colour, alpha=0.15, linewidth=0)
