@@ -8,7 +8,9 @@ ARCHIVE ?=
 RECOMPUTE ?=
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
-SNAKEMAKE = python tools/study.py --cores $(CORES)
+SNAKEMAKE = $(NO_CORES)python tools/study.py --cores $(CORES)
+NO_CORES = $(if $(filter 0,$(CORES)),$(error CORES is 0, and Snakemake would wait for ever: give \
+    the number of jobs at a time, at least 1))
 OVERLAY = $(if $(WITH),--configfile $(WITH))
 QUICK = --configfile config/quick.yaml
 NO_WITH = $(if $(WITH),$(error drafts are of the default picture; for one of yours give folders \

@@ -110,6 +110,13 @@ def test_a_draft_of_another_picture_is_not_that_of_the_default_one(target):
     assert 'make study WITH="config/quick.yaml my.yaml"' in ended.stderr
 
 
+def test_no_job_at_a_time_is_refused():
+    command = ["make", "--dry-run", "study", "CORES=0"]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert ended.returncode == 2
+    assert "CORES is 0" in ended.stderr
+
+
 def test_settings_of_deviations_exist():
     schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
     known = settings(schema)
