@@ -81,6 +81,7 @@ def in_fork(prepare: Callable[[], None], arguments: list[str]) -> tuple[int, str
     In a fork of this process, which has imported Snakemake already: half the time.
     """
     import snakemake.cli
+    import snakemake.shell
 
     with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
         process = os.fork()
@@ -91,6 +92,9 @@ def in_fork(prepare: Callable[[], None], arguments: list[str]) -> tuple[int, str
                 os.dup2(errors.fileno(), 2)
                 sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
                 sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
+                # It gives jobs what this was when it was imported, perhaps by a test that
+                # captures it.
+                snakemake.shell.STDOUT = sys.stdout
                 prepare()
                 snakemake.cli.main(arguments)
                 status = 0
@@ -122,7 +126,10 @@ def forked(
         os.environ.update(env)
 
     assert command[:3] == [sys.executable, "-m", "snakemake"]
-    return subprocess.CompletedProcess(command, *in_fork(prepare, command[3:]))
+    status, output, errors = in_fork(prepare, command[3:])
+    if status:
+        print(errors, file=sys.stderr)  # for the report of a test that fails
+    return subprocess.CompletedProcess(command, status, output, errors)
 
 
 def copy_of_project(folder: Path, own_library: bool = True) -> Project:
