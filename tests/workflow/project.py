@@ -81,7 +81,6 @@ def in_fork(prepare: Callable[[], None], arguments: list[str]) -> tuple[int, str
     In a fork of this process, which has imported Snakemake already: half the time.
     """
     import snakemake.cli
-    import snakemake.shell
 
     with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
         process = os.fork()
@@ -94,7 +93,7 @@ def in_fork(prepare: Callable[[], None], arguments: list[str]) -> tuple[int, str
                 sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
                 # It gives jobs what this was when it was imported, perhaps by a test that
                 # captures it.
-                snakemake.shell.STDOUT = sys.stdout
+                sys.modules["snakemake.shell"].STDOUT = sys.stdout
                 prepare()
                 snakemake.cli.main(arguments)
                 status = 0
