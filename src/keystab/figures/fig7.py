@@ -157,7 +157,8 @@ def _draw_counts(ax: Axes, counts: DataFrame) -> list[EndLabel]:
             label = f"{n_spo} {style.limit(row['max_offset'])} {style.limit(row['max_iterations'])}"
             ax.plot([x, x], [row["n_always"], row["n_unique"]], linewidth=0.6, **line)
             ax.plot(x, row["n_unique"], "_", markersize=4.0, label=f"{label}, any", **line)
-            ax.plot(x, row["n_always"], "o", markersize=4.0, label=label, **line)
+            # Whole dots, also where none is seen in all views.
+            ax.plot(x, row["n_always"], "o", markersize=4.0, label=label, clip_on=False, **line)
     lefts = (len(models) + 0.5) * np.arange(len(blocks))
     ticks = (lefts[:, None] + np.arange(len(models))).ravel()
     ax.set_xticks(ticks, [style.limit(n_models) for n_models in models] * len(blocks))

@@ -99,7 +99,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
             lower[column].set_xlabel(f"{good} ones kept (%)")
             if column != 1:  # as in the first column
                 lower[column].set_ylabel(f"{bad} ones rejected (%)")
-        _name_pictures(upper[0], colours)
+        _name_pictures(upper[2], colours)
         _name_models(upper[0], place)
         return style.settle(figure, draft)
 
@@ -142,11 +142,11 @@ def _draw_areas(
 
 
 def _name_pictures(ax: Axes, colours: dict[str, str]) -> None:
-    """Write the names of the pictures, each in its colour, where the worst predictors leave room."""
+    """Write the names of the pictures, each in its colour, where the best predictors leave room."""
     lines = [*colours.items(), ("open: its other blocks", palette.GREY)]
-    for line, (text, colour) in enumerate(lines):
-        place = {"transform": ax.transAxes, "ha": "right", "va": "top"}
-        ax.text(0.99, 0.99 - 0.04 * line, text, color=colour, fontsize=style.SMALL, **place)
+    for line, (text, colour) in enumerate(reversed(lines)):
+        place = {"transform": ax.transAxes, "ha": "left", "va": "bottom"}
+        ax.text(0.2, 0.02 + 0.04 * line, text, color=colour, fontsize=style.SMALL, **place)
 
 
 def _name_models(ax: Axes, place: dict[str, float]) -> None:

@@ -140,7 +140,7 @@ def _draw_share(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> No
     bottom = 100 * min(spline[f"{name}_low"].min(), cosine[name].min())
     ax.set_ylim(bottom - 0.03 * (100 - bottom), 100 + 0.06 * (100 - bottom))
     if name == "precision":
-        names = [("dotted: second ones as well", palette.GREY)]
+        names = [("dotted: second detections too", palette.GREY)]
     else:
         names = [*palette.DETECTION_COLOURS.items(), ("circles: cosine series", palette.GREY)]
     _list(ax, names)
