@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 import keystab
+from keystab import band_limited_search, block_rows, dog_space, operators
 from keystab.sampling import Sampling, balanced_delta
 
 CAMERA_BLUR = 1.1
@@ -35,12 +36,31 @@ def fine_image(image: np.ndarray, n_spo: int) -> np.ndarray:
 
 def keystab_spline(image: np.ndarray, n_spo: int, threads: int = 1):
     """Oversampling, operators, search and refinement."""
-    return lambda: len(keystab.detect_keypoints(image, CAMERA_BLUR, n_spo, threads=threads))
+
+    def detect() -> int:
+        forget_operators()
+        return len(keystab.detect_keypoints(image, CAMERA_BLUR, n_spo, threads=threads))
+
+    return detect
 
 
 def keystab_cosine(image: np.ndarray, n_spo: int):
     """The same with the cosine series of the image."""
-    return lambda: len(keystab.detect_keypoints(image, CAMERA_BLUR, n_spo, oversampling="cosine"))
+
+    def detect() -> int:
+        forget_operators()
+        return len(keystab.detect_keypoints(image, CAMERA_BLUR, n_spo, oversampling="cosine"))
+
+    return detect
+
+
+def forget_operators() -> None:
+    """Forget what keystab keeps for further images of one size: building it counts here."""
+    dog_space._axis.cache_clear()
+    for kept in (block_rows.axis_blocks, block_rows.blocks_abreast, block_rows.expansion):
+        kept.cache_clear()
+    for kept in (band_limited_search.interpolation, operators.band_limited_basis):
+        kept.cache_clear()
 
 
 def textbook(image: np.ndarray, n_spo: int):

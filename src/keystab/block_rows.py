@@ -86,7 +86,9 @@ class AxisBlocks(NamedTuple):
 
 @lru_cache(maxsize=8)
 def axis_blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisBlocks:
-    """Rows of all blocks of an axis at their nodes, and what bounds all others.
+    """Rows of blocks of an axis at their nodes, and what bounds all others.
+
+    Images of one size share them, as they share those of `blocks_abreast`.
 
     Parameters
     ----------
@@ -118,6 +120,12 @@ def axis_blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisB
     return AxisBlocks(start, first, width, offset, entries, *bounds)
 
 
+@lru_cache(maxsize=64)
+def blocks_abreast(axis: SplineAxis, start: int, length: int, count: int) -> AxisBlocks:
+    """As `axis_blocks`, for a few blocks one after the other: 0.5 MB for six of them."""
+    return axis_blocks.__wrapped__(axis, tuple(start + k * length for k in range(count)), length)
+
+
 class WholeRows(NamedTuple):
     """All rows of blocks for some blurs, for compiled code.
 
@@ -144,7 +152,6 @@ class WholeRows(NamedTuple):
         return rows, int(self.first[block, blur])
 
 
-@lru_cache(maxsize=8)
 def whole_rows(
     axis: SplineAxis, starts: tuple[int, ...], length: int, blurs: tuple[int, ...]
 ) -> WholeRows:

@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from keystab.block_rows import AxisBlocks, axis_blocks, expansion, whole_rows
+from keystab.block_rows import AxisBlocks, axis_blocks, blocks_abreast, expansion, whole_rows
 from keystab.block_scan import ROOM, SINGLE_ROUNDING, difference, gathered, scan, starts_of
 from keystab.dog_space import ScaleSpace
 from keystab.operators import SplineAxis
@@ -150,8 +150,7 @@ class InterpolatedSearch:
 
     def x_blocks(self, column: int) -> AxisBlocks:
         """Rows of the blocks that lie abreast in one column of blocks."""
-        left, length = self.x_starts[column], self.length
-        return axis_blocks(self.x_axis, tuple(range(left, left + self.abreast, length)), length)
+        return blocks_abreast(self.x_axis, self.x_starts[column], self.length, _ABREAST)
 
     def error_bounds(self, x_blocks: AxisBlocks) -> NDArray[np.float64]:
         """Bound of the interpolation error of every block of a column, and of every slice.
