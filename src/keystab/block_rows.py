@@ -99,6 +99,16 @@ def axis_blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisB
     length : int
         Samples of a block.
     """
+    return _blocks(axis, starts, length)
+
+
+@lru_cache(maxsize=64)
+def blocks_abreast(axis: SplineAxis, start: int, length: int, count: int) -> AxisBlocks:
+    """As `axis_blocks`, for a few blocks one after the other: 0.5 MB for six of them."""
+    return _blocks(axis, tuple(start + k * length for k in range(count)), length)
+
+
+def _blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisBlocks:
     nodes, expand = expansion(length)
     blurs = np.arange(axis.rows.reach.size)
     start = np.array(starts, dtype=np.int64)
@@ -118,12 +128,6 @@ def axis_blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisB
         bounds,
     )
     return AxisBlocks(start, first, width, offset, entries, *bounds)
-
-
-@lru_cache(maxsize=64)
-def blocks_abreast(axis: SplineAxis, start: int, length: int, count: int) -> AxisBlocks:
-    """As `axis_blocks`, for a few blocks one after the other: 0.5 MB for six of them."""
-    return axis_blocks.__wrapped__(axis, tuple(start + k * length for k in range(count)), length)
 
 
 class WholeRows(NamedTuple):
