@@ -7,6 +7,7 @@ their own expansion.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -85,7 +86,9 @@ class AxisBlocks(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def axis_blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisBlocks:
+def axis_blocks(
+    axis: SplineAxis, starts: tuple[int, ...], length: int, threads: int = 1
+) -> AxisBlocks:
     """Rows of blocks of an axis at their nodes, and what bounds all others.
 
     Images of one size share them, as they share those of `blocks_abreast`.
@@ -98,8 +101,10 @@ def axis_blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisB
         First sample of every block.
     length : int
         Samples of a block.
+    threads : int
+        Blocks that are filled at once.
     """
-    return _blocks(axis, starts, length)
+    return _blocks(axis, starts, length, threads)
 
 
 @lru_cache(maxsize=64)
@@ -108,25 +113,35 @@ def blocks_abreast(axis: SplineAxis, start: int, length: int, count: int) -> Axi
     return _blocks(axis, tuple(start + k * length for k in range(count)), length)
 
 
-def _blocks(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisBlocks:
+def _blocks(axis: SplineAxis, starts: tuple[int, ...], length: int, threads: int = 1) -> AxisBlocks:
     nodes, expand = expansion(length)
     blurs = np.arange(axis.rows.reach.size)
     start = np.array(starts, dtype=np.int64)
     first, width, offset, size = _layout(axis, start, length, blurs, nodes.size)
     entries, bounds = np.empty(size), np.empty((4, start.size, blurs.size))
-    _fill_nodes(
-        axis.rows,
-        start * axis.stride,
-        axis.stride,
-        nodes,
-        expand,
-        _FROM_MOMENTS,
-        np.empty((length, axis.n_columns)),
-        width,
-        offset,
-        entries,
-        bounds,
-    )
+
+    def fill(part: slice) -> None:
+        _fill_nodes(
+            axis.rows,
+            start[part] * axis.stride,
+            axis.stride,
+            nodes,
+            expand,
+            _FROM_MOMENTS,
+            np.empty((length, axis.n_columns)),
+            width[part],
+            offset[part],
+            entries,
+            bounds[:, part],
+        )
+
+    if threads == 1:
+        fill(slice(None))
+    else:
+        at_once = -(-start.size // (4 * threads))  # blocks at the ends take less time
+        parts = [slice(i, i + at_once) for i in range(0, start.size, at_once)]
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(fill, parts))
     return AxisBlocks(start, first, width, offset, entries, *bounds)
 
 
@@ -221,43 +236,61 @@ def _fill_nodes(
 @njit(cache=True, nogil=True)
 def _row_bounds(rows, residual, from_moments):
     """Largest norms of `AxisBlocks` over the rows of one block and blur; `residual` is spoiled."""
-    n_columns = rows.shape[1]
+    n_rows, n_columns = residual.shape
     middle = n_columns // 2 - 2
     smooth = rough = norm = size = 0.0
-    moments, split = np.empty(4), np.empty(4)
-    for y in range(rows.shape[0]):
+    for y in range(n_rows):
+        size, norm = max(size, _sum_of_sizes(residual[y])), max(norm, _sum_of_sizes(rows[y]))
+    if n_columns < 8:
+        return smooth, size, norm, size
+    split = np.dot(_moments(residual, middle + 1.5), from_moments.T)
+    for y in range(n_rows):
         r = residual[y]
-        here = whole = 0.0
-        moments[:] = 0.0
-        for x in range(n_columns):
-            here += abs(r[x])
-            whole += abs(rows[y, x])
-            place = x - middle - 1.5
-            moments[0] += r[x]
-            moments[1] += r[x] * place
-            moments[2] += r[x] * place * place
-            moments[3] += r[x] * place * place * place
-        size, norm = max(size, here), max(norm, whole)
-        if n_columns < 8:
-            continue
         apart = 0.0
         for k in range(4):
-            split[k] = (from_moments[k] * moments).sum()
-            r[middle + k] -= split[k]
-            apart += abs(split[k])
+            r[middle + k] -= split[y, k]
+            apart += abs(split[y, k])
         # Four running sums at once.
         a = b = c = d = 0.0
         summed = left = 0.0
-        for x in range(n_columns):
+        for x in range(n_columns - 4):
             a += r[x]
             b += a
             c += b
             d += c
-            if x < n_columns - 4:
-                summed += abs(d)
-            else:
-                left += abs(d)
+            summed += abs(d)
+        for x in range(n_columns - 4, n_columns):
+            a += r[x]
+            b += a
+            c += b
+            d += c
+            left += abs(d)
         smooth = max(smooth, summed)
         # What the sums do not bring to zero at the end is rounding, and counted as rough.
         rough = max(rough, apart + 16 * left)
-    return smooth, (rough if n_columns >= 8 else size), norm, size
+    return smooth, rough, norm, size
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _sum_of_sizes(values):
+    total = 0.0
+    for x in range(values.size):
+        total += abs(values[x])
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _moments(rows, middle):
+    """Moments 0 to 3 of every row about a place among its columns, shape (n_rows, 4)."""
+    moments = np.empty((rows.shape[0], 4))
+    for y in range(rows.shape[0]):
+        r = rows[y]
+        m0 = m1 = m2 = m3 = 0.0
+        for x in range(r.size):
+            place = x - middle
+            m0 += r[x]
+            m1 += r[x] * place
+            m2 += r[x] * place * place
+            m3 += r[x] * place * place * place
+        moments[y, 0], moments[y, 1], moments[y, 2], moments[y, 3] = m0, m1, m2, m3
+    return moments

@@ -106,9 +106,10 @@ def extrema_and_cubes(
     tolerance = max(epsilon, space.rounding)
     space.source, space.axes, space.blurs  # noqa: B018  made once, before threads share them
     what = f"extrema, n_spo {space.sampling.n_spo}" if show_progress else None
+    asked = inner_window(space, window)
     found = [decided(space, np.empty((0, 4), dtype=np.int64), tolerance)]
     with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
-        for find, columns in _searches(space, tolerance, pool, inner_window(space, window)):
+        for find, columns in _searches(space, tolerance, pool, threads, asked):
             candidates = pool.map(find, columns)
             # Decided once all columns are given out: short tasks for threads that have none left.
             tasks = [
@@ -147,14 +148,18 @@ def within(extrema: np.ndarray, window: tuple[slice, slice] | None) -> np.ndarra
 
 
 def _searches(
-    space: ScaleSpace, tolerance: float, pool: ThreadPoolExecutor, window: tuple[slice, slice]
+    space: ScaleSpace,
+    tolerance: float,
+    pool: ThreadPoolExecutor,
+    threads: int,
+    window: tuple[slice, slice],
 ) -> Iterator[tuple[Callable[[Any], np.ndarray], Sequence[Any]]]:
     """What finds the candidates of a column of blocks, and the columns, band by band."""
     columns = list(ranges(window[1].start, window[1].stop, BLOCK_COLUMNS))
     for top, bottom in ranges(window[0].start, window[0].stop, BAND_ROWS):
         few: InterpolatedSearch | BandLimitedSearch
         if interpolated_search.applies(space):
-            few = InterpolatedSearch(space, tolerance, slice(top, bottom), window[1])
+            few = InterpolatedSearch(space, tolerance, slice(top, bottom), window[1], threads)
             yield partial(_interpolated, few), range(few.n_columns)
         elif band_limited_search.applies(space):
             few = BandLimitedSearch(space, tolerance, slice(top, bottom), window[1])
@@ -304,7 +309,7 @@ def _scan(dog, epsilon, extrema):
         for y in range(1, n_rows - 1):
             here, above, below = dog[s, y], dog[s, y - 1], dog[s, y + 1]
             finer, coarser = dog[s - 1, y], dog[s + 1, y]
-            any_here = 0
+            any_here = False
             for x in range(1, n_columns - 1):
                 low, high = here[x] - slack, here[x] + slack
                 maximum = (

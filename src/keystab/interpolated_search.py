@@ -26,7 +26,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from keystab.block_rows import AxisBlocks, axis_blocks, blocks_abreast, expansion, whole_rows
-from keystab.block_scan import ROOM, SINGLE_ROUNDING, difference, gathered, scan, starts_of
+from keystab.block_scan import (
+    ROOM,
+    SINGLE_ROUNDING,
+    difference,
+    gathered,
+    largest_size,
+    scan,
+    starts_of,
+)
 from keystab.dog_space import ScaleSpace
 from keystab.operators import SplineAxis
 
@@ -119,9 +127,13 @@ class InterpolatedSearch:
         By how much an extremum differs from each of its 26 neighbours.
     rows, columns : slice
         Samples that are asked for; others may be among the candidates.
+    threads : int
+        For the operators of the y axis, which all columns of blocks share.
     """
 
-    def __init__(self, space: ScaleSpace, tolerance: float, rows: slice, columns: slice) -> None:
+    def __init__(
+        self, space: ScaleSpace, tolerance: float, rows: slice, columns: slice, threads: int = 1
+    ) -> None:
         self.space, self.tolerance = space, tolerance
         length = self.length = block_length(space)
         y_axis, x_axis = space.axes
@@ -129,7 +141,7 @@ class InterpolatedSearch:
         self.abreast = _ABREAST * length
         self.x_axis, self.x_starts = x_axis, starts_of(columns, space.shape[2], self.abreast)
         y_starts = starts_of(rows, space.shape[1], length)
-        y_blocks = axis_blocks(y_axis, y_starts, length)
+        y_blocks = axis_blocks(y_axis, y_starts, length, threads)
         # Only the rows of the source that the blocks see are held for a column.
         top, bottom = y_blocks.first.min(), (y_blocks.first + y_blocks.width).max()
         self.source = space.source[top:bottom]
@@ -176,15 +188,16 @@ class InterpolatedSearch:
         source, blocks = self.source, self.x_blocks(column)
         _, lower, upper = self.space.blurs
         nodes, expand = expansion(self.length)
-        n_blurs = blocks.first.shape[1]
-        strips = np.zeros((n_blurs, source.shape[0], _ABREAST * nodes.size))
-        for blur in range(n_blurs):
-            for block in range(_ABREAST):
-                width, start = blocks.width[block, blur], blocks.offset[block, blur]
-                rows = blocks.entries[start : start + nodes.size * width].reshape(-1, width)
-                left = blocks.first[block, blur]
-                part = strips[blur, :, block * nodes.size : (block + 1) * nodes.size]
-                np.matmul(source[:, left : left + width], rows.T, out=part)
+        strips = np.empty((blocks.first.shape[1], source.shape[0], _ABREAST * nodes.size))
+        left, right = blocks.first.min(), (blocks.first + blocks.width).max()
+        _strips(
+            np.ascontiguousarray(source[:, left:right].T),
+            blocks.first - left,
+            blocks.width,
+            blocks.offset,
+            blocks.entries,
+            strips,
+        )
         whole = np.zeros((len(self.kinked), source.shape[0], self.abreast), dtype=np.float32)
         every = whole_rows(
             self.x_axis, self.x_starts[column : column + 1], self.abreast, self.kinked
@@ -224,6 +237,35 @@ class InterpolatedSearch:
 
 
 @njit(cache=True, nogil=True)
+def _strips(source, first, width, offset, entries, strips):
+    """Products along x of every source row with the node rows of blocks that lie abreast.
+
+    Compiled, so that threads need not take turns between one small product and the next.
+
+    Parameters
+    ----------
+    source : ndarray, shape (n_columns, n_rows)
+        The columns that the blocks meet, transposed.
+    first, width, offset, entries
+        See `keystab.block_rows.AxisBlocks`.
+    strips : ndarray, shape (n_blurs, n_rows, n_blocks * n_nodes)
+        Written to.
+    """
+    n_blurs, n_rows, across = strips.shape
+    n_blocks = first.shape[0]
+    n_nodes = across // n_blocks
+    product = np.empty((n_nodes, n_rows))
+    for blur in range(n_blurs):
+        for block in range(n_blocks):
+            n, begin, left = width[block, blur], offset[block, blur], first[block, blur]
+            rows = entries[begin : begin + n_nodes * n].reshape(n_nodes, n)
+            np.dot(rows, source[left : left + n], product)
+            for y in range(n_rows):
+                for k in range(n_nodes):
+                    strips[blur, y, block * n_nodes + k] = product[k, y]
+
+
+@njit(cache=True, nogil=True)
 def _search(  # noqa: PLR0913
     strips,
     first,
@@ -258,6 +300,10 @@ def _search(  # noqa: PLR0913
     error = np.empty(n_slices)
     every = np.empty((whole.shape[0], length, abreast * length), dtype=np.float32)
     whole_error = np.empty(whole.shape[0])
+    largest = np.zeros(whole.shape[:2], dtype=np.float32)  # size of every row of the strips
+    for k in range(whole.shape[0]):
+        for y in range(whole.shape[1]):
+            largest[k, y] = largest_size(whole[k, y])
     for i in range(starts.size):
         for blur in range(n_blurs):
             n = width[i, blur]
@@ -269,10 +315,9 @@ def _search(  # noqa: PLR0913
             n = whole_rows.width[i, k]
             begin, top = whole_rows.offset[i, k], whole_rows.first[i, k]
             rows = whole_rows.entries[begin : begin + length * n].reshape(length, n)
-            strip = whole[k, top : top + n]
-            np.dot(rows, strip, every[k])
+            np.dot(rows, whole[k, top : top + n], every[k])
             # A sum of n products, of numbers that were rounded; absolute rows add up to below two.
-            whole_error[k] = 2 * (n + 4) * SINGLE_ROUNDING * np.abs(strip).max()
+            whole_error[k] = 2 * (n + 4) * SINGLE_ROUNDING * largest[k, top : top + n].max()
         for s in range(n_kinked):
             error[s] = SINGLE_ROUNDING * difference(
                 every[whole_upper[s]], every[whole_lower[s]], dog[s]

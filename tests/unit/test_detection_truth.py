@@ -12,7 +12,7 @@ from keystab.detection import detect_keypoints
 from keystab.dog_space import scale_space
 from keystab.errors import InputError
 from keystab.extrema import discrete_extrema
-from keystab.operators import SplineAxis
+from keystab.operators import SplineAxis, cosine_domain_kernel
 from keystab.sampling import balanced_delta
 
 KAPPA = 2 ** (1 / 3)
@@ -75,6 +75,20 @@ def test_cosine_slices_are_the_series():
         value = wave_y @ (coefficients * gain) @ wave_x
         box = space.window(slice(s, s + 1), slice(row, row + 1), slice(column, column + 1))
         assert abs(box.item() - value) < 1e-12
+
+
+@pytest.mark.parametrize("n_samples", [11, 40, 301])
+@pytest.mark.parametrize("blur", [0.0, 0.6, 1.5, 2.89, 2.9, 4.5, 30.0])
+def test_kernels_are_the_sums_of_their_cosines(n_samples, blur):
+    kernel = cosine_domain_kernel(n_samples, blur)
+    # The transform has period 2m: of its frequencies, 0 and m count once and all others twice.
+    omega = np.pi * np.arange(n_samples + 1) / n_samples
+    gain = np.exp(-((blur * omega) ** 2) / 2)
+    gain[1:-1] *= 2
+    turns = np.outer(np.arange(n_samples + 1), np.arange(n_samples + 1)) % (2 * n_samples)
+    whole = np.cos(np.pi * turns / n_samples) @ gain / (2 * n_samples)
+    np.testing.assert_allclose(kernel, whole[: kernel.size], rtol=0, atol=3e-16)
+    assert np.abs(whole[kernel.size :]).max(initial=0) < 3e-16
 
 
 @settings(max_examples=20, deadline=None)

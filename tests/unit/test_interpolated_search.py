@@ -12,6 +12,7 @@ from scenes import blobs
 
 from keystab import band_limited_search, extrema, interpolated_search
 from keystab.band_limited_search import BandLimitedSearch
+from keystab.block_rows import axis_blocks
 from keystab.dog_space import scale_space
 from keystab.interpolated_search import InterpolatedSearch, applies, expansion
 
@@ -110,6 +111,16 @@ def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
             assert (off <= bound + 1e-14).all()
             reached = max(reached, (off / bound)[:4].max())
     assert reached > 1e-3
+
+
+@pytest.mark.parametrize("n_blocks", [1, 7, 12])
+def test_rows_of_blocks_do_not_depend_on_the_threads_that_make_them(n_blocks):
+    axis = scale_space(scene("blobs"), 1.1, 12).axes[0]
+    starts = tuple(range(0, 5 * n_blocks, 5))
+    for one, three in zip(
+        axis_blocks(axis, starts, 26), axis_blocks(axis, starts, 26, threads=3), strict=True
+    ):
+        np.testing.assert_array_equal(one, three)
 
 
 @pytest.mark.parametrize("kind", ["blobs", "noise", "edge"])
