@@ -104,16 +104,19 @@ def axis_blocks(
     threads : int
         Blocks that are filled at once.
     """
-    return _blocks(axis, starts, length, threads)
+    return new_blocks(axis, starts, length, threads)
 
 
 @lru_cache(maxsize=64)
-def blocks_abreast(axis: SplineAxis, start: int, length: int, count: int) -> AxisBlocks:
-    """As `axis_blocks`, for a few blocks one after the other: 0.5 MB for six of them."""
-    return _blocks(axis, tuple(start + k * length for k in range(count)), length)
+def blocks_abreast(axis: SplineAxis, starts: tuple[int, ...], length: int) -> AxisBlocks:
+    """As `axis_blocks`, for the few blocks of one column: 0.5 MB for six of them."""
+    return new_blocks(axis, starts, length)
 
 
-def _blocks(axis: SplineAxis, starts: tuple[int, ...], length: int, threads: int = 1) -> AxisBlocks:
+def new_blocks(
+    axis: SplineAxis, starts: tuple[int, ...], length: int, threads: int = 1
+) -> AxisBlocks:
+    """As `axis_blocks`, without keeping them."""
     nodes, expand = expansion(length)
     blurs = np.arange(axis.rows.reach.size)
     start = np.array(starts, dtype=np.int64)

@@ -44,6 +44,36 @@ def limit(name: str, value: Any, least: float | None = None, above: float | None
     return number(name, value, least, above)
 
 
+def truth(name: str, value: Any) -> bool:
+    """Return True or False, or refuse what is neither.
+
+    Examples
+    --------
+    >>> truth("refine", True)
+    True
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} is {value!r}, allowed are True and False: change {name}")
+    return bool(value)
+
+
+def count(name: str, value: Any, least: int) -> float:
+    """Return a whole number, also one that is written as a float, or infinity.
+
+    Examples
+    --------
+    >>> count("max_iterations", 2.0, least=1), count("max_iterations", math.inf, least=1)
+    (2, inf)
+    """
+    given = limit(name, value, least)
+    if given != math.inf and given != int(given):
+        raise InputError(
+            f"{name} is {value!r}, allowed is a whole number of at least {least} or infinity: "
+            f"change {name}"
+        )
+    return given if given == math.inf else int(given)
+
+
 def integer(name: str, value: Any, least: int, most: int | None = None) -> int:
     """Return a whole number, or refuse it.
 

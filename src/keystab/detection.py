@@ -23,8 +23,6 @@ from keystab.refinement import (
     trace,
 )
 
-_NEIGHBOURS = np.delete(np.arange(27), 13)
-
 
 def detect_keypoints(
     image: np.ndarray,
@@ -115,11 +113,11 @@ def detect_keypoints(
     [20.0, 20.0, 1.78]
     """
     checks.integer("n_oct", n_oct, least=1, most=40)
-    checks.limit("max_iterations", max_iterations, least=1)
+    checks.count("max_iterations", max_iterations, least=1)
     checks.limit("max_offset", max_offset, above=0)
     checks.integer("n_spo", n_spo, least=1)
-    if not isinstance(refine, (bool, np.bool_)):
-        raise InputError(f"refine is {refine!r}, allowed are True and False: change refine")
+    checks.truth("refine", refine)
+    checks.truth("scale_moves", scale_moves)
     if move not in MOVES:
         raise InputError(f"move is {move!r}, allowed are {' and '.join(MOVES)}: change move")
     octaves = []
@@ -179,7 +177,10 @@ def extrema_table(
     if cubes is None:
         cubes = space.neighbourhoods(s, row, column)
     value = cubes[:, 1, 1, 1]
-    around = cubes.reshape(-1, 27)[:, _NEIGHBOURS]
+    difference = np.full(value.size, np.inf)
+    for neighbour in np.delete(np.arange(27), 13):  # one by one, for the memory's sake
+        around = cubes.reshape(-1, 27)[:, neighbour]
+        np.minimum(difference, np.abs(around - value), out=difference)
     gradient, hessian = quadratic_model(cubes)
     alpha = stationary_point(gradient, hessian)
     offsets = dict(zip(("alpha_s", "alpha_y", "alpha_x"), alpha.T, strict=True))
@@ -195,7 +196,7 @@ def extrema_table(
             "s": s,
             "row": row,
             "column": column,
-            "difference": np.abs(around - value[:, None]).min(axis=1, initial=np.inf),
+            "difference": difference,
             **{name: gradient[:, i] for name, i in GRADIENT_COLUMNS.items()},
             **{name: hessian[:, i, j] for name, (i, j) in HESSIAN_COLUMNS.items()},
             **{f"step_{name}": step[name] for name in ("y", "x", "sigma")},

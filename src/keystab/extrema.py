@@ -11,6 +11,7 @@ grid was cut into blocks nor on whether the values come from a store.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -23,6 +24,7 @@ from numba import njit
 from keystab import band_limited_search, checks, interpolated_search, memory
 from keystab.band_limited_search import BandLimitedSearch
 from keystab.dog_space import ScaleSpace, ranges
+from keystab.errors import InputError
 from keystab.interpolated_search import InterpolatedSearch
 from keystab.operators import Block
 from keystab.progress import progress
@@ -35,6 +37,9 @@ BLOCK_COLUMNS = 256
 
 # Rows whose operators are held at once: bounds the memory on large images.
 BAND_ROWS = 8192
+
+# Samples that one search may meet, some two to four thousand seconds of one core.
+MOST_SAMPLES = 10**12
 
 Decided = tuple[np.ndarray, np.ndarray]
 """Extrema, shape (n, 4), and their cubes of samples, shape (n, 3, 3, 3)."""
@@ -71,7 +76,8 @@ def discrete_extrema(
     Raises
     ------
     InputError
-        If `epsilon` is negative or not finite, or `threads` is less than 1.
+        If `epsilon` is negative or not finite, `threads` is less than 1, the memory does not
+        suffice, or there are more than 1e12 samples, which would take about an hour.
     """
     return extrema_and_cubes(space, epsilon, threads, show_progress, window)[0]
 
@@ -96,17 +102,11 @@ def extrema_and_cubes(
     """
     checks.number("epsilon", epsilon, least=0)
     checks.integer("threads", threads, least=1)
-    height, width = space.sampling.shape
-    memory.require(
-        bytes_of_search(space, threads),
-        f"a search of {height} x {width} pixels at n_spo = {space.sampling.n_spo}, "
-        f"delta_min = {space.sampling.delta_min:.4g}",
-        "crop the picture, or use fewer scales or a larger delta_min",
-    )
+    asked = inner_window(space, window)
+    _require_an_end(space, threads, asked)
     tolerance = max(epsilon, space.rounding)
     space.source, space.axes, space.blurs  # noqa: B018  made once, before threads share them
     what = f"extrema, n_spo {space.sampling.n_spo}" if show_progress else None
-    asked = inner_window(space, window)
     found = [decided(space, np.empty((0, 4), dtype=np.int64), tolerance)]
     with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
         for find, columns in _searches(space, tolerance, pool, threads, asked):
@@ -123,6 +123,21 @@ def extrema_and_cubes(
     extrema, first = np.unique(extrema, axis=0, return_index=True)
     inside = within(extrema, window)
     return extrema[inside], cubes[first[inside]]
+
+
+def _require_an_end(space: ScaleSpace, threads: int, asked: tuple[slice, slice]) -> None:
+    """Refuse a search that the memory, or the patience of whoever waits, does not suffice for."""
+    height, width = space.sampling.shape
+    what = f"a search of {height} x {width} pixels at n_spo = {space.sampling.n_spo}, delta_min = "
+    what += f"{space.sampling.delta_min:.4g}"
+    remedy = "crop the picture, or use fewer scales or a larger delta_min"
+    n_samples = space.shape[0] * math.prod(max(part.stop - part.start, 0) for part in asked)
+    if n_samples > MOST_SAMPLES:
+        raise InputError(
+            f"{what} meets {n_samples:.2g} samples, allowed are {MOST_SAMPLES:.0g}, about an hour: "
+            f"{remedy}"
+        )
+    memory.require(bytes_of_search(space, threads), what, remedy)
 
 
 def inner_window(
@@ -156,10 +171,13 @@ def _searches(
 ) -> Iterator[tuple[Callable[[Any], np.ndarray], Sequence[Any]]]:
     """What finds the candidates of a column of blocks, and the columns, band by band."""
     columns = list(ranges(window[1].start, window[1].stop, BLOCK_COLUMNS))
-    for top, bottom in ranges(window[0].start, window[0].stop, BAND_ROWS):
+    bands = list(ranges(window[0].start, window[0].stop, BAND_ROWS))
+    for top, bottom in bands:
         few: InterpolatedSearch | BandLimitedSearch
         if interpolated_search.applies(space):
-            few = InterpolatedSearch(space, tolerance, slice(top, bottom), window[1], threads)
+            few = InterpolatedSearch(
+                space, tolerance, slice(top, bottom), window[1], threads, keep=len(bands) == 1
+            )
             yield partial(_interpolated, few), range(few.n_columns)
         elif band_limited_search.applies(space):
             few = BandLimitedSearch(space, tolerance, slice(top, bottom), window[1])

@@ -25,7 +25,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from keystab.block_rows import AxisBlocks, axis_blocks, blocks_abreast, expansion, whole_rows
+from keystab.block_rows import (
+    AxisBlocks,
+    axis_blocks,
+    blocks_abreast,
+    expansion,
+    new_blocks,
+    whole_rows,
+)
 from keystab.block_scan import (
     ROOM,
     SINGLE_ROUNDING,
@@ -129,19 +136,29 @@ class InterpolatedSearch:
         Samples that are asked for; others may be among the candidates.
     threads : int
         For the operators of the y axis, which all columns of blocks share.
+    keep : bool
+        Whether the operators of both axes, some tens of MB, are kept for further images of this
+        size.
     """
 
     def __init__(
-        self, space: ScaleSpace, tolerance: float, rows: slice, columns: slice, threads: int = 1
+        self,
+        space: ScaleSpace,
+        tolerance: float,
+        rows: slice,
+        columns: slice,
+        threads: int = 1,
+        keep: bool = True,
     ) -> None:
-        self.space, self.tolerance = space, tolerance
+        self.space, self.tolerance, self.keep = space, tolerance, keep
         length = self.length = block_length(space)
         y_axis, x_axis = space.axes
         assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
         self.abreast = _ABREAST * length
         self.x_axis, self.x_starts = x_axis, starts_of(columns, space.shape[2], self.abreast)
         y_starts = starts_of(rows, space.shape[1], length)
-        y_blocks = axis_blocks(y_axis, y_starts, length, threads)
+        make = axis_blocks if keep else new_blocks
+        y_blocks = make(y_axis, y_starts, length, threads)
         # Only the rows of the source that the blocks see are held for a column.
         top, bottom = y_blocks.first.min(), (y_blocks.first + y_blocks.width).max()
         self.source = space.source[top:bottom]
@@ -162,7 +179,10 @@ class InterpolatedSearch:
 
     def x_blocks(self, column: int) -> AxisBlocks:
         """Rows of the blocks that lie abreast in one column of blocks."""
-        return blocks_abreast(self.x_axis, self.x_starts[column], self.length, _ABREAST)
+        first = self.x_starts[column]
+        starts = tuple(first + block * self.length for block in range(_ABREAST))
+        make = blocks_abreast if self.keep else new_blocks
+        return make(self.x_axis, starts, self.length)
 
     def error_bounds(self, x_blocks: AxisBlocks) -> NDArray[np.float64]:
         """Bound of the interpolation error of every block of a column, and of every slice.

@@ -317,6 +317,10 @@ def test_a_tolerance_keeps_exactly_the_extrema_that_exceed_it():
         ({"max_iterations": True}, "max_iterations"),
         ({"move": "far", "refine": False}, "nearest and unit_step"),
         ({"refine": "no"}, "True and False"),
+        ({"scale_moves": "x"}, "scale_moves"),
+        ({"max_iterations": 2.5}, "whole number"),
+        ({"max_iterations": math.nan}, "max_iterations"),
+        ({"delta_min": 1e-4, "image": np.zeros((300, 300))}, "samples"),
     ],
     ids=str,
 )
