@@ -209,8 +209,12 @@ def _draw_rule(ax: Axes, comparisons: Sequence[Comparison], colours: Colours) ->
         ax.plot([half[0]] * 2, whole[1:], color=colour, linewidth=1.0, label="interval")
         ax.plot(half[1:], [whole[0]] * 2, color=colour, linewidth=1.0, label="interval")
         ax.plot([half[0]], [whole[0]], "o", color=colour, markersize=4.0, label=f"{noise:g}")
-        # To the right of the intervals: near the origin, those of the strongest noises meet.
-        style.direct_label(ax, half[2], whole[0], f"{noise:g}", colour, right=4.0, ha="left")
+        # On the side away from the line of equality; near the origin, where the intervals of the
+        # strongest noises meet and the axis leaves no room, to the right of them.
+        left = whole[0] > half[0] and half[1] > 12.0
+        at, right, ha = (half[1], -4.0, "right") if left else (half[2], 4.0, "left")
+        kind: dict[str, Any] = {"bbox": {"color": "white", "pad": 0.4}, "ha": ha}
+        style.direct_label(ax, at, whole[0], f"{noise:g}", colour, right, **kind)
     if not comparisons:
         text = "nothing to compare"
         place: dict[str, Any] = {"transform": ax.transAxes, "ha": "center", "fontsize": style.SMALL}
