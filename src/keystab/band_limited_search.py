@@ -203,13 +203,13 @@ def _search(  # noqa: PLR0913
     nodes = np.empty((n_along, n_across), dtype=np.float32)
     half = np.empty((n_along, x_expand_t.shape[1]), dtype=np.float32)
     dog = np.empty((n_slices, n_rows, x_expand_t.shape[1]), dtype=np.float32)
-    error = np.empty(n_slices)
+    error = np.empty((n_slices, 1))
     for i in range(starts.size):
         np.dot(y_rows[i], side_by_side, gaussians)
         each = gaussians.reshape(n_along, n_blurs, n_across)
         for s in range(n_slices):
             largest = difference(each[:, upper[s]], each[:, lower[s]], nodes)
-            error[s] = bounds[s] + rounding * largest
+            error[s, 0] = bounds[s] + rounding * largest
             np.dot(nodes, x_expand_t, half)
             np.dot(y_expand, half, dog[s])
         counts[i] = scan(dog, error, tolerance, starts[i], left, found[i])

@@ -82,18 +82,19 @@ def difference(high, low, out):
 
 @njit(cache=True, nogil=True)
 def scan(dog, error, tolerance, top, left, found):
-    """Write samples that may be extrema, given how far each slice may be off.
+    """Write samples that may be extrema, given how far each slice may be off in each block abreast.
 
     Few rows hold one that exceeds, or falls short of, its four neighbours in the slice, and almost
     none one that does so in scale as well. Both are asked of whole rows without a branch, which the
     compiler turns into vector instructions; only then a row is looked at sample by sample.
     """
     n_slices, n_rows, n_columns = dog.shape
+    n_blocks = error.shape[1]
+    length = n_columns // n_blocks
     count = 0
-    slack = np.empty(3, dtype=np.float32)
+    slack, slack_x = np.empty(3, dtype=np.float32), np.empty(3, dtype=np.float32)
     for s in range(1, n_slices - 1):
-        for ds in range(3):
-            slack[ds] = (tolerance - error[s] - error[s - 1 + ds]) * (1 - 1e-6) - 1e-30
+        _set_slack(slack, tolerance, error, s, 0, n_blocks)
         slack_f, slack_h, slack_c = slack
         for y in range(1, n_rows - 1):
             here, above, below = dog[s, y], dog[s, y - 1], dog[s, y + 1]
@@ -136,7 +137,11 @@ def scan(dog, error, tolerance, top, left, found):
             if not in_scale:
                 continue
             for x in range(1, n_columns - 1):
-                if _may_be(dog, s, y, x, slack):
+                if not _may_be(dog, s, y, x, slack):
+                    continue
+                # Blocks at the border of the image may be off by far more than those beside them.
+                _set_slack(slack_x, tolerance, error, s, (x - 1) // length, (x + 1) // length + 1)
+                if _may_be(dog, s, y, x, slack_x):
                     if count < found.shape[0]:
                         found[count, 0] = s
                         found[count, 1] = top + y
@@ -144,6 +149,15 @@ def scan(dog, error, tolerance, top, left, found):
                         found[count, 3] = 0
                     count += 1
     return count
+
+
+@njit(cache=True, nogil=True)
+def _set_slack(slack, tolerance, error, s, first, last):
+    """By how much samples of three slices differ where exact ones differ by the tolerance."""
+    here = error[s, first:last].max()
+    for ds in range(3):
+        off = here + error[s - 1 + ds, first:last].max()
+        slack[ds] = (tolerance - off) * (1 - 1e-6) - 1e-30
 
 
 @njit(cache=True, nogil=True)

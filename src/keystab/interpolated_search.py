@@ -189,19 +189,19 @@ class InterpolatedSearch:
 
         Returns
         -------
-        ndarray, shape (n_y_blocks, n_slices)
+        ndarray, shape (n_y_blocks, n_slices, n_x_blocks)
         """
         _, lower, upper = self.space.blurs
         y_blocks = self.y_blocks
-        level, along_y, along_x = _local_maxima(self.source, y_blocks, x_blocks)
+        # Axes (blur, y block, x block).
+        level, along_y, along_x = _local_maxima(self.source, y_blocks, x_blocks)[..., None]
         smooth, rough, norm = (
-            of_blocks.max(axis=0)[:, None]
-            for of_blocks in (x_blocks.smooth, x_blocks.rough, x_blocks.norm)
+            of_blocks.T[:, None] for of_blocks in (x_blocks.smooth, x_blocks.rough, x_blocks.norm)
         )
-        e_y = y_blocks.smooth.T * along_y + y_blocks.rough.T * level
+        e_y = y_blocks.smooth.T[..., None] * along_y + y_blocks.rough.T[..., None] * level
         e_x = smooth * along_x + rough * level
-        bound = norm * e_y + (y_blocks.norm + y_blocks.residual).T * e_x
-        return np.ascontiguousarray((bound[lower] + bound[upper]).T)
+        bound = norm * e_y + (y_blocks.norm + y_blocks.residual).T[..., None] * e_x
+        return np.ascontiguousarray((bound[lower] + bound[upper]).transpose(1, 0, 2))
 
     def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[int, int]]]:
         """Samples of one column of blocks that may be extrema; see `block_scan.gathered`."""
@@ -317,7 +317,7 @@ def _search(  # noqa: PLR0913
     nodes = np.empty((n_nodes, across), dtype=np.float32)
     half = np.empty((length, across), dtype=np.float32)
     dog = np.empty((n_slices, length, abreast * length), dtype=np.float32)
-    error = np.empty(n_slices)
+    error = np.empty((n_slices, abreast))
     every = np.empty((whole.shape[0], length, abreast * length), dtype=np.float32)
     whole_error = np.empty(whole.shape[0])
     largest = np.zeros(whole.shape[:2], dtype=np.float32)  # size of every row of the strips
@@ -339,10 +339,8 @@ def _search(  # noqa: PLR0913
             # A sum of n products, of numbers that were rounded; absolute rows add up to below two.
             whole_error[k] = 2 * (n + 4) * SINGLE_ROUNDING * largest[k, top : top + n].max()
         for s in range(n_kinked):
-            error[s] = SINGLE_ROUNDING * difference(
-                every[whole_upper[s]], every[whole_lower[s]], dog[s]
-            )
-            error[s] += whole_error[whole_upper[s]] + whole_error[whole_lower[s]]
+            off = SINGLE_ROUNDING * difference(every[whole_upper[s]], every[whole_lower[s]], dog[s])
+            error[s] = off + whole_error[whole_upper[s]] + whole_error[whole_lower[s]]
         for s in range(n_kinked, n_slices):
             high, low = gaussians[upper[s]], gaussians[lower[s]]
             error[s] = bounds[i, s] + rounding * difference(high, low, nodes)

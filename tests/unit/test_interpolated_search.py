@@ -107,7 +107,9 @@ def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
             box = dog[:, top : top + search.length, left : left + search.length]
             interpolated = expand @ box[:, nodes][:, :, nodes] @ expand.T
             off = np.abs(interpolated - box).max(axis=(1, 2))
-            bound = bounds[j // interpolated_search._ABREAST][i]
+            bound = bounds[j // interpolated_search._ABREAST][
+                i, :, j % interpolated_search._ABREAST
+            ]
             assert (off <= bound + 1e-14).all()
             reached = max(reached, (off / bound)[:4].max())
     assert reached > 1e-3
