@@ -17,6 +17,8 @@ Examples
 
 from importlib import import_module
 
+from keystab.outdated_loops import forget_outdated
+
 __version__ = "0.1.0"
 
 # Where each public name lives.
@@ -47,3 +49,6 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return __all__
+
+
+forget_outdated()
