@@ -121,7 +121,7 @@ def new_blocks(
     blurs = np.arange(axis.rows.reach.size)
     start = np.array(starts, dtype=np.int64)
     first, width, offset, size = _layout(axis, start, length, blurs, nodes.size)
-    entries, bounds = np.empty(size), np.empty((4, start.size, blurs.size))
+    entries, bounds = np.empty(size), np.empty((start.size, 4, blurs.size))
 
     def fill(part: slice) -> None:
         _fill_nodes(
@@ -135,7 +135,7 @@ def new_blocks(
             width[part],
             offset[part],
             entries,
-            bounds[:, part],
+            bounds[part],
         )
 
     if threads == 1:
@@ -145,7 +145,8 @@ def new_blocks(
         parts = [slice(i, i + at_once) for i in range(0, start.size, at_once)]
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(fill, parts))
-    return AxisBlocks(start, first, width, offset, entries, *bounds)
+    each = np.ascontiguousarray(bounds.transpose(1, 0, 2))
+    return AxisBlocks(start, first, width, offset, entries, *each)
 
 
 class WholeRows(NamedTuple):
@@ -233,7 +234,7 @@ def _fill_nodes(
             for y in range(residual.shape[0]):
                 for x in range(n):
                     residual[y, x] = room[y, x] - residual[y, x]
-            bounds[:, i, blur] = _row_bounds(room[:, :n], residual, from_moments)
+            bounds[i, :, blur] = _row_bounds(room[:, :n], residual, from_moments)
 
 
 @njit(cache=True, nogil=True)
