@@ -26,7 +26,15 @@ import scipy.linalg
 from numba import njit
 from numpy.typing import NDArray
 
-from keystab.block_scan import ROOM, SINGLE_ROUNDING, difference, gathered, scan, starts_of
+from keystab.block_scan import (
+    LARGEST,
+    ROOM,
+    SINGLE_ROUNDING,
+    difference,
+    gathered,
+    scan,
+    starts_of,
+)
 from keystab.dog_space import ScaleSpace
 from keystab.operators import CosineAxis, band_limited_basis
 
@@ -43,6 +51,8 @@ def applies(space: ScaleSpace) -> bool:
     if space.oversampling != "cosine":
         return False
     if space.shape[1] < _ROWS or space.shape[2] < _COLUMNS:
+        return False
+    if np.abs(space.image).max() > LARGEST:
         return False
     return interpolation(_ROWS, space.sampling.step) is not None
 

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 # Relative error of single precision.
 SINGLE_ROUNDING = 2.0**-24
 
+# Images with larger values are left to a dense evaluation, which does not use single precision.
+LARGEST = 1e30
+
 # Candidates that have room in one block; blocks with more are left to a dense evaluation.
 ROOM = 256
 
@@ -55,7 +58,7 @@ def gathered(
     return np.concatenate([np.empty((0, 4), dtype=np.int64), *parts]), undecided
 
 
-# Without regard for NaN, which no finite image gives, a maximum takes vector instructions.
+# Without regard for NaN, which no image up to `LARGEST` gives, a maximum takes vector instructions.
 _FINITE = {"nnan", "nsz"}
 
 
@@ -153,11 +156,14 @@ def scan(dog, error, tolerance, top, left, found):
 
 @njit(cache=True, nogil=True)
 def _set_slack(slack, tolerance, error, s, first, last):
-    """By how much samples of three slices differ where exact ones differ by the tolerance."""
+    """Write by how much at least samples differ, in three slices, where exact ones do sufficiently.
+
+    A little less, for the rounding of the comparison.
+    """
     here = error[s, first:last].max()
     for ds in range(3):
-        off = here + error[s - 1 + ds, first:last].max()
-        slack[ds] = (tolerance - off) * (1 - 1e-6) - 1e-30
+        least = tolerance - here - error[s - 1 + ds, first:last].max()
+        slack[ds] = least - 1e-6 * abs(least) - 1e-30
 
 
 @njit(cache=True, nogil=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from typing import Any
 
@@ -65,13 +66,17 @@ def count(name: str, value: Any, least: int) -> float:
     >>> count("max_iterations", 2.0, least=1), count("max_iterations", math.inf, least=1)
     (2, inf)
     """
-    given = limit(name, value, least)
-    if given != math.inf and given != int(given):
+    given: float = math.nan
+    with contextlib.suppress(InputError):
+        given = limit(name, value, least)
+    if given == math.inf:
+        return given
+    if not given.is_integer():
         raise InputError(
             f"{name} is {value!r}, allowed is a whole number of at least {least} or infinity: "
             f"change {name}"
         )
-    return given if given == math.inf else int(given)
+    return int(given)
 
 
 def integer(name: str, value: Any, least: int, most: int | None = None) -> int:

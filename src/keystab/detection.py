@@ -91,7 +91,8 @@ def detect_keypoints(
     Raises
     ------
     InputError
-        For an image that is not a finite two-dimensional array, or a parameter out of its range.
+        For an image that is not a finite two-dimensional array, a parameter out of its range, or a
+        search that takes more memory than there is or meets more than 1e12 samples.
 
     Notes
     -----

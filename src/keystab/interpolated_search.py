@@ -34,6 +34,7 @@ from keystab.block_rows import (
     whole_rows,
 )
 from keystab.block_scan import (
+    LARGEST,
     ROOM,
     SINGLE_ROUNDING,
     difference,
@@ -65,6 +66,8 @@ def applies(space: ScaleSpace) -> bool:
     if space.oversampling != "spline" or length < _LEAST:
         return False
     if min(space.shape[1], space.shape[2]) < _ABREAST * length:
+        return False
+    if np.abs(space.image).max() > LARGEST:
         return False
     axis = space.axes[0]
     assert isinstance(axis, SplineAxis)
@@ -137,8 +140,8 @@ class InterpolatedSearch:
     threads : int
         For the operators of the y axis, which all columns of blocks share.
     keep : bool
-        Whether the operators of both axes, some tens of MB, are kept for further images of this
-        size.
+        Whether operators, some tens of MB, are kept for further images of this size: those of the y
+        axis, and those of up to 64 columns of blocks.
     """
 
     def __init__(
@@ -296,7 +299,7 @@ def _search(  # noqa: PLR0913
     lower,
     upper,
     whole,
-    whole_rows,
+    every_row,
     n_kinked,
     whole_lower,
     whole_upper,
@@ -320,7 +323,7 @@ def _search(  # noqa: PLR0913
     error = np.empty((n_slices, abreast))
     every = np.empty((whole.shape[0], length, abreast * length), dtype=np.float32)
     whole_error = np.empty(whole.shape[0])
-    largest = np.zeros(whole.shape[:2], dtype=np.float32)  # size of every row of the strips
+    largest = np.zeros(whole.shape[:2], dtype=np.float32)  # size of every row of `whole`
     for k in range(whole.shape[0]):
         for y in range(whole.shape[1]):
             largest[k, y] = largest_size(whole[k, y])
@@ -332,9 +335,9 @@ def _search(  # noqa: PLR0913
             top = first[i, blur]
             np.dot(rows, strips[blur, top : top + n], gaussians[blur])
         for k in range(whole.shape[0]):
-            n = whole_rows.width[i, k]
-            begin, top = whole_rows.offset[i, k], whole_rows.first[i, k]
-            rows = whole_rows.entries[begin : begin + length * n].reshape(length, n)
+            n = every_row.width[i, k]
+            begin, top = every_row.offset[i, k], every_row.first[i, k]
+            rows = every_row.entries[begin : begin + length * n].reshape(length, n)
             np.dot(rows, whole[k, top : top + n], every[k])
             # A sum of n products, of numbers that were rounded; absolute rows add up to below two.
             whole_error[k] = 2 * (n + 4) * SINGLE_ROUNDING * largest[k, top : top + n].max()

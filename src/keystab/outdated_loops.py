@@ -1,24 +1,29 @@
 """Compiled loops that no longer belong to the code, and how they are forgotten.
 
 numba keeps a compiled loop beside its module and compiles it again when that file changes, but not
-when a loop that it calls in another file does. A checkout that was updated or edited would go on
-with the old one. The workflow and the tests keep theirs apart, see
-`keystab.fingerprint.folder_of_loops`; this serves whoever imports the library.
+when a loop that it calls in another file does. A checkout that was updated would go on with the old
+one. The workflow and the tests keep theirs apart, see `keystab.fingerprint.folder_of_loops`; this
+serves whoever imports the library from a folder that can be written to. Loops kept elsewhere, in
+NUMBA_CACHE_DIR or in numba's folder for packages that are only readable, are left alone, and an
+edit between the import and the first use is seen only if another one follows.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 from pathlib import Path
 
 PACKAGE_FOLDER = Path(__file__).parent
+STAMP = "compiled_from.txt"
 
 
-def forget_outdated(package_folder: Path = PACKAGE_FOLDER) -> int:
-    """Remove the indices of compiled loops that are older than a module of the package.
+def forget_outdated(package_folder: Path = PACKAGE_FOLDER) -> bool:
+    """Remove the compiled loops of a package if its modules are not those of the last time.
 
-    Nothing is done where the environment variable NUMBA_CACHE_DIR names another folder.
+    Names, sizes and times of the modules are compared with a stamp beside the loops: equal or not,
+    whatever the clock says.
 
     Parameters
     ----------
@@ -27,23 +32,34 @@ def forget_outdated(package_folder: Path = PACKAGE_FOLDER) -> int:
 
     Returns
     -------
-    int
-        How many were removed. A loop without its index is compiled again.
+    bool
+        Whether the modules had changed.
 
     Examples
     --------
     >>> import tempfile
-    >>> forget_outdated(Path(tempfile.mkdtemp()))
-    0
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> forget_outdated(folder), forget_outdated(folder)
+    (True, False)
     """
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return 0
-    removed = 0
-    # Another process may remove them too, and a package that is only readable keeps its own.
-    with contextlib.suppress(OSError), os.scandir(package_folder) as modules:
-        newest = max((m.stat().st_mtime for m in modules if m.name.endswith(".py")), default=0.0)
-        for index in (package_folder / "__pycache__").glob("*.nbi"):
-            if index.stat().st_mtime < newest:
-                index.unlink()
-                removed += 1
-    return removed
+    kept = package_folder / "__pycache__"
+    try:
+        with os.scandir(package_folder) as modules:
+            each = sorted(
+                (m.name, m.stat().st_size, m.stat().st_mtime_ns)
+                for m in modules
+                if m.name.endswith(".py")
+            )
+        stamp = hashlib.sha256(repr(each).encode()).hexdigest()
+        if (kept / STAMP).is_file() and (kept / STAMP).read_text() == stamp:
+            return False
+        # Indices first: data without one are never read, but a new index could find old data.
+        for pattern in ("*.nbi", "*.nbc"):
+            for path in kept.glob(pattern):
+                with contextlib.suppress(FileNotFoundError):  # another process removes them too
+                    path.unlink()
+        kept.mkdir(exist_ok=True)
+        (kept / STAMP).write_text(stamp)
+    except OSError:  # only readable: numba keeps nothing here either
+        return False
+    return True

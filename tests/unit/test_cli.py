@@ -296,18 +296,19 @@ def test_too_large_for_memory_is_refused_beforehand(picture, monkeypatch, capsys
     assert "needs about" in capsys.readouterr().err
 
 
-def test_memory_estimate_bounds_what_is_taken(picture):
+@pytest.mark.parametrize("options", [{}, {"n_spo": 15}, {"n_spo": 15, "oversampling": "cosine"}])
+def test_memory_estimate_bounds_what_is_taken(picture, options):
     import tracemalloc
 
     image = np.tile(read_picture(picture), (3, 4))
-    detect_keypoints(image[:30, :30], 0.8)  # what is made once does not count
+    detect_keypoints(image[:60, :60], 0.8, **options)  # what is made once does not count
     tracemalloc.start()
     try:
-        detect_keypoints(image, 0.8)
+        detect_keypoints(image, 0.8, **options)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert 0.2 < peak / bytes_of_search(scale_space(image, 0.8)) < 1
+    assert 0.2 < peak / bytes_of_search(scale_space(image, 0.8, **options)) < 1
 
 
 def test_help_and_version_need_nothing_heavy():

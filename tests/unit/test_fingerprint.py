@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
 from keystab import fingerprint as room
-from keystab.outdated_loops import forget_outdated
 
 FILES = {
     "__init__.py": '"""Names."""\n__version__ = "1"\n',
@@ -192,21 +190,3 @@ def test_every_stage_and_figure_of_the_study_can_be_followed():
     assert "keystab.extrema" in room.imported_modules("keystab.stages.detect")
     assert "keystab.extrema" not in room.imported_modules("keystab.stages.simulate")
     assert "keystab.detection" not in room.imported_modules("keystab.figures.fig1")
-
-
-def test_compiled_loops_older_than_a_module_are_forgotten(tmp_path, monkeypatch):
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    kept = tmp_path / "__pycache__"
-    kept.mkdir()
-    for time, path in enumerate(
-        [kept / "a.nbi", kept / "a.1.nbc", tmp_path / "b.py", kept / "c.nbi", kept / "d.nbi"]
-    ):
-        path.touch()
-        os.utime(path, (1000 + time, 1000 + time))
-    assert forget_outdated(tmp_path) == 1
-    assert sorted(path.name for path in kept.iterdir()) == ["a.1.nbc", "c.nbi", "d.nbi"]
-    os.utime(tmp_path / "b.py", (2000, 2000))
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert forget_outdated(tmp_path) == 0
-    monkeypatch.delenv("NUMBA_CACHE_DIR")
-    assert forget_outdated(tmp_path) == 2

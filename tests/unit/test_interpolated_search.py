@@ -13,6 +13,7 @@ from scenes import blobs
 from keystab import band_limited_search, extrema, interpolated_search
 from keystab.band_limited_search import BandLimitedSearch
 from keystab.block_rows import axis_blocks
+from keystab.block_scan import scan
 from keystab.dog_space import scale_space
 from keystab.interpolated_search import InterpolatedSearch, applies, expansion
 
@@ -84,6 +85,45 @@ def test_whatever_the_sampling(options, oversampling):
 def test_whatever_the_picture(seed, height, width, oversampling):
     found, dense = both(blobs((height, width), seed), 14, oversampling=oversampling)
     assert found.tolist() == dense.tolist()
+
+
+@pytest.mark.parametrize("factor", [1e39, 1e200])
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
+def test_values_beyond_single_precision_have_the_same_extrema(factor, oversampling):
+    image = blobs((31, 43), 1)
+    found, beyond = (
+        extrema.discrete_extrema(scale_space(scaled, 1.1, 12, oversampling=oversampling))
+        for scaled in (image, factor * image)
+    )
+    np.testing.assert_array_equal(beyond, found)
+
+
+@pytest.mark.parametrize(
+    ("x", "errors", "kept"),
+    [
+        (3, (0.0, 3.5), True),  # its right neighbour lies in the worse block
+        (4, (3.5, 0.0), True),
+        (2, (0.0, 3.5), False),
+        (5, (3.5, 0.0), False),
+    ],
+)
+def test_candidates_are_held_to_the_errors_of_the_blocks_they_touch(x, errors, kept):
+    dog = np.zeros((3, 3, 8), dtype=np.float32)
+    dog[0], dog[2] = -100.0, 100.0  # grows with scale, so that nothing else is extremal
+    dog[2, :, x - 1 : x + 2] = -100.0
+    dog[1, 1, x] = 50.0
+    dog[0, 1, x] = 51.9  # above it, as is possible where both are off by 3.5 and need differ by 5
+    found = np.empty((4, 4), dtype=np.int64)
+    assert scan(dog, np.array([errors] * 3), 5.0, 0, 0, found) == kept
+
+
+@pytest.mark.parametrize("off", [1e-4, 1e-7])
+def test_the_margin_of_a_comparison_is_on_the_safe_side(off):
+    # Errors above the tolerance: a candidate may fall short of its neighbours.
+    short = np.float32(2 * off - 1e-30)
+    dog = np.full((3, 3, 3), short, dtype=np.float32)
+    dog[1, 1, 1] = 0.0
+    assert scan(dog, np.full((3, 1), off), 0.0, 0, 0, np.empty((4, 4), dtype=np.int64)) == 1
 
 
 def test_a_constant_picture_has_none():
