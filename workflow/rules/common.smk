@@ -61,6 +61,9 @@ STREAMED_SETS = [name for name in SEARCHED_SETS if name not in KEPT_SETS]
 # Compiled loops are kept with the other things that can be made again, and shared by all jobs.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(fingerprints.folder_of_loops(Path.cwd())))
 
+# Jobs use the Python that runs Snakemake, also where its environment was not activated.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+
 
 def spelled(value):
     """A value as the commands of stages take it; 3 and 3.0 are the same number."""
