@@ -62,7 +62,7 @@ STREAMED_SETS = [name for name in SEARCHED_SETS if name not in KEPT_SETS]
 os.environ.setdefault("NUMBA_CACHE_DIR", str(fingerprints.folder_of_loops(Path.cwd())))
 
 # Jobs use the Python that runs Snakemake, also where its environment was not activated.
-os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+os.environ.update(PATH=os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()]))
 
 
 def spelled(value):
