@@ -1,7 +1,7 @@
 """Compile the library's loops once, where the study and the tests keep them.
 
 Compiling takes as long as a draft of all figures; the set-up does it so that no job waits for it,
-nor the command `keystab`, nor an import of the library: those look for the loops beside the modules.
+nor the command `keystab`, nor an import of the library: these look for loops beside the modules.
 """
 
 import os

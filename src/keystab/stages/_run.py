@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import errno
 import functools
+import gc
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -15,6 +17,11 @@ from typing import Any, TypeVar
 # imported; Snakemake sets the same from a rule's threads.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# Most stages take a second, a third of it for garbage collection: while the libraries are imported,
+# and of all that they hold at the end, which the system takes back faster.
+gc.set_threshold(10_000, 10, 10)
+atexit.register(gc.freeze)
 
 from keystab.errors import InputError  # noqa: E402
 
