@@ -34,32 +34,34 @@ def fine_image(image: np.ndarray, n_spo: int) -> np.ndarray:
     return np.clip(map_coordinates(image, grid, order=3, mode="reflect"), 0, 1)
 
 
-def keystab_spline(image: np.ndarray, n_spo: int, threads: int = 1):
+def keystab_spline(image: np.ndarray, n_spo: int, threads: int = 1, oversampling: str = "spline"):
     """Oversampling, operators, search and refinement."""
 
     def detect() -> int:
         forget_operators()
-        return len(keystab.detect_keypoints(image, CAMERA_BLUR, n_spo, threads=threads))
+        found = keystab.detect_keypoints(
+            image, CAMERA_BLUR, n_spo, oversampling=oversampling, threads=threads
+        )
+        return len(found)
 
     return detect
 
 
 def keystab_cosine(image: np.ndarray, n_spo: int):
     """The same with the cosine series of the image."""
-
-    def detect() -> int:
-        forget_operators()
-        return len(keystab.detect_keypoints(image, CAMERA_BLUR, n_spo, oversampling="cosine"))
-
-    return detect
+    return keystab_spline(image, n_spo, oversampling="cosine")
 
 
 def forget_operators() -> None:
     """Forget what keystab keeps for further images of one size: building it counts here."""
-    dog_space._axis.cache_clear()
-    for kept in (block_rows.axis_blocks, block_rows.blocks_abreast, block_rows.expansion):
-        kept.cache_clear()
-    for kept in (band_limited_search.interpolation, operators.band_limited_basis):
+    for kept in (
+        dog_space._axis,
+        block_rows.axis_blocks,
+        block_rows.blocks_abreast,
+        block_rows.expansion,
+        band_limited_search.interpolation,
+        operators.band_limited_basis,
+    ):
         kept.cache_clear()
 
 

@@ -9,7 +9,6 @@ import shutil
 from pathlib import Path
 
 from keystab.fingerprint import PACKAGE_FOLDER, folder_of_loops
-from keystab.outdated_loops import forget_outdated
 
 LOOPS = folder_of_loops(Path(__file__).parents[1])
 os.environ["NUMBA_CACHE_DIR"] = str(LOOPS)
@@ -25,7 +24,6 @@ if __name__ == "__main__":
         detect_keypoints(picture, 0.5, n_spo=4, oversampling=oversampling)
         detect_keypoints(picture, 1.1, n_spo=12, oversampling=oversampling)  # from few samples
     extrema_of_array(np.zeros((3, 3, 3)), 0.0)
-    forget_outdated()
     for kind in ("nbc", "nbi"):  # an index comes after what it names
         for path in LOOPS.glob(f"*/*.{kind}"):
             shutil.copy2(path, PACKAGE_FOLDER / "__pycache__" / path.name)

@@ -52,7 +52,7 @@ def applies(space: ScaleSpace) -> bool:
         return False
     if space.shape[1] < _ROWS or space.shape[2] < _COLUMNS:
         return False
-    if np.abs(space.image).max() > LARGEST:
+    if space.largest > LARGEST:
         return False
     return interpolation(_ROWS, space.sampling.step) is not None
 

@@ -236,6 +236,11 @@ class ScaleSpace:
         return evaluate(self.source, self.axes, lower, upper, *indices)
 
     @cached_property
+    def largest(self) -> float:
+        """Largest absolute value of the image."""
+        return max(float(self.image.max()), -float(self.image.min()))
+
+    @cached_property
     def rounding(self) -> float:
         """Largest difference of two values of this scale-space that rounding can explain.
 

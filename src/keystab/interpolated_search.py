@@ -67,7 +67,7 @@ def applies(space: ScaleSpace) -> bool:
         return False
     if min(space.shape[1], space.shape[2]) < _ABREAST * length:
         return False
-    if np.abs(space.image).max() > LARGEST:
+    if space.largest > LARGEST:
         return False
     axis = space.axes[0]
     assert isinstance(axis, SplineAxis)

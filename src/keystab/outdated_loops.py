@@ -11,7 +11,6 @@ edit between the import and the first use is seen only if another one follows.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import os
 from pathlib import Path
 
@@ -45,12 +44,12 @@ def forget_outdated(package_folder: Path = PACKAGE_FOLDER) -> bool:
     kept = package_folder / "__pycache__"
     try:
         with os.scandir(package_folder) as modules:
-            each = sorted(
-                (m.name, m.stat().st_size, m.stat().st_mtime_ns)
+            each = [
+                f"{m.name} {m.stat().st_size} {m.stat().st_mtime_ns}\n"
                 for m in modules
                 if m.name.endswith(".py")
-            )
-        stamp = hashlib.sha256(repr(each).encode()).hexdigest()
+            ]
+        stamp = "".join(sorted(each))
         if (kept / STAMP).is_file() and (kept / STAMP).read_text() == stamp:
             return False
         # Indices first: data without one are never read, but a new index could find old data.

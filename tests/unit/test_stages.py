@@ -80,7 +80,7 @@ def test_every_stage_explains_itself(name, capsys):
     with pytest.raises(SystemExit) as caught:
         importlib.import_module(f"keystab.stages.{name}").main(["--help"])
     assert caught.value.code == 0
-    assert len(capsys.readouterr().out.splitlines()) > 6
+    assert len(capsys.readouterr().out.splitlines()) > 8
 
 
 def test_stored_and_streamed_detections_are_the_same_to_the_bit(reference, tmp_path):
