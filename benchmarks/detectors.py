@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 import keystab
-from keystab import band_limited_search, block_rows, dog_space, operators
-from keystab.sampling import Sampling, balanced_delta
+from keystab.detection import search_cosine, search_rows
+from keystab.scalespace import dog, operators
+from keystab.scalespace.sampling import Sampling, balanced_delta
 
 CAMERA_BLUR = 1.1
 SIGMA_MIN = 1.1
@@ -55,11 +56,11 @@ def keystab_cosine(image: np.ndarray, n_spo: int):
 def forget_operators() -> None:
     """Forget what keystab keeps for further images of one size: building it counts here."""
     for kept in (
-        dog_space._axis,
-        block_rows.axis_blocks,
-        block_rows.blocks_abreast,
-        block_rows.expansion,
-        band_limited_search.interpolation,
+        dog._axis,
+        search_rows.axis_blocks,
+        search_rows.blocks_abreast,
+        search_rows.expansion,
+        search_cosine.interpolation,
         operators.band_limited_basis,
     ):
         kept.cache_clear()

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.detectors import DETECTORS, keystab_spline
-from keystab.camera import simulate_view
-from keystab.pictures import read_picture
+from keystab.camera.simulation import simulate_view
+from keystab.io.pictures import read_picture
 
 PICTURE = "config/images/coldwarm.png"
 

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from keystab.fingerprint import folder_of_loops
+from keystab.provenance.code_digest import folder_of_loops
 
 # Loops that numba has compiled are kept where the study keeps them.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(folder_of_loops(Path(__file__).parents[1])))

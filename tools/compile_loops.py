@@ -8,22 +8,43 @@ import os
 import shutil
 from pathlib import Path
 
-from keystab.fingerprint import PACKAGE_FOLDER, folder_of_loops
+from keystab.provenance.code_digest import PACKAGE_FOLDER, folder_of_loops, modules_of_loops
 
-LOOPS = folder_of_loops(Path(__file__).parents[1])
-os.environ["NUMBA_CACHE_DIR"] = str(LOOPS)
 
-import numpy as np  # noqa: E402
+def copy_beside_modules(loops: Path, package_folder: Path) -> None:
+    """Copy compiled loops to where numba looks for them when it is told nothing.
 
-from keystab.detection import detect_keypoints  # noqa: E402
-from keystab.extrema import extrema_of_array  # noqa: E402
+    Where it is told a folder, numba keeps those of a module in one below it whose name starts with
+    that of the module's own folder.
+
+    Parameters
+    ----------
+    loops : Path
+        Folder that numba was told.
+    package_folder : Path
+        Folder of the package, whose rooms get the loops in their ``__pycache__``.
+    """
+    for module in modules_of_loops(package_folder):
+        path = package_folder.joinpath(*module.split(".")[1:])
+        for kind in ("nbc", "nbi"):  # an index comes after what it names
+            for made in loops.glob(f"{path.parent.name}_*/{path.name}.*.{kind}"):
+                kept = path.parent / "__pycache__"
+                kept.mkdir(exist_ok=True)
+                shutil.copy2(made, kept / made.name)
+
 
 if __name__ == "__main__":
+    folder = folder_of_loops(Path(__file__).parents[1])
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+
+    import numpy as np
+
+    from keystab.detection.detector import detect_keypoints
+    from keystab.detection.extrema import extrema_of_array
+
     picture = np.random.default_rng(0).random((40, 40))
     for oversampling in ("spline", "cosine"):
         detect_keypoints(picture, 0.5, n_spo=4, oversampling=oversampling)
         detect_keypoints(picture, 1.1, n_spo=12, oversampling=oversampling)  # from few samples
     extrema_of_array(np.zeros((3, 3, 3)), 0.0)
-    for kind in ("nbc", "nbi"):  # an index comes after what it names
-        for path in LOOPS.glob(f"*/*.{kind}"):
-            shutil.copy2(path, PACKAGE_FOLDER / "__pycache__" / path.name)
+    copy_beside_modules(folder, PACKAGE_FOLDER)

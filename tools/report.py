@@ -28,12 +28,12 @@ from docutils.core import publish_parts
 from rule_graph import drawn, edges_of
 
 import keystab
-from keystab.claims import VERDICTS
 from keystab.errors import InputError
-from keystab.files import written_whole
-from keystab.fingerprint import fingerprint
-from keystab.provenance import file_digest
-from keystab.workflow import Study
+from keystab.provenance.code_digest import fingerprint
+from keystab.provenance.lineage import file_digest
+from keystab.provenance.study_folder import Study
+from keystab.study.claims import VERDICTS
+from keystab.utils.files import written_whole
 
 ROOT = Path(__file__).parents[1]
 PAGE = "page.html.jinja"

@@ -26,9 +26,9 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from keystab import feasibility, settings
 from keystab.errors import InputError
-from keystab.fingerprint import CATALOGUES, PACKAGE_FOLDER, imported_modules
+from keystab.provenance.code_digest import CATALOGUES, PACKAGE_FOLDER, imported_modules
+from keystab.study import feasibility, settings
 
 sys.path.insert(0, str(Path(__file__).parent))
 from study import Clock, read_durations  # noqa: E402

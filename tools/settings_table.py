@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from keystab.settings import allowed
+from keystab.study.settings import allowed
 
 ROOT = Path(__file__).parents[1]
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"

@@ -114,7 +114,7 @@ def config_files(arguments: list[str]) -> list[str]:
 
 def not_writable(arguments: list[str]) -> list[str]:
     """Folders of the settings in which nothing can be written."""
-    from keystab.settings import read_yaml
+    from keystab.study.settings import read_yaml
 
     settings = read_yaml("config/config.yaml", *config_files(arguments))
     folders = [".snakemake", *(str(settings[key]) for key in ("results", "figures", "logs"))]
@@ -129,7 +129,7 @@ def existing(folder: Path) -> Path:
 def wrong_file(arguments: list[str]) -> str:
     """What is wrong with a file of settings among the arguments, which Snakemake would not say."""
     from keystab.errors import InputError
-    from keystab.settings import read_yaml
+    from keystab.study.settings import read_yaml
 
     for name in config_files(arguments):
         if not Path(name).is_file():

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from keystab.workflow import jobs_and_reasons
+from keystab.provenance.study_folder import jobs_and_reasons
 
 sys.path.insert(0, str(Path(__file__).parent))
 from study import Clock, in_words, kind_of, read_durations, wrong_file  # noqa: E402

@@ -22,18 +22,18 @@ __version__ = "0.1.0"
 # Where each public name lives.
 _HOME = {
     "InputError": "errors",
-    "balanced_delta": "sampling",
-    "detect_keypoints": "detection",
-    "fit_psf": "psf",
-    "occurrence": "matching",
-    "open_scale_space": "stores",
-    "open_views": "stores",
-    "read_picture": "pictures",
-    "scale_space": "dog_space",
-    "scene_extrema": "scene_truth",
-    "simulate_view": "camera",
-    "true_extrema": "truth",
-    "unique_keypoints": "matching",
+    "balanced_delta": "scalespace.sampling",
+    "detect_keypoints": "detection.detector",
+    "fit_psf": "camera.psf_fit",
+    "occurrence": "matching.unique_keypoints",
+    "open_scale_space": "io.scale_space_store",
+    "open_views": "io.scale_space_store",
+    "read_picture": "io.pictures",
+    "scale_space": "scalespace.dog",
+    "scene_extrema": "truth.scene_extrema",
+    "simulate_view": "camera.simulation",
+    "true_extrema": "truth.true_extrema",
+    "unique_keypoints": "matching.unique_keypoints",
 }
 
 __all__ = ["__version__", *sorted(_HOME)]
@@ -50,4 +50,4 @@ def __dir__() -> list[str]:
 
 
 # Not a plain import: it changes no result, and what a stage imports is part of its fingerprint.
-import_module("keystab.outdated_loops").forget_outdated()
+import_module("keystab.provenance.compiled_loops").forget_outdated()

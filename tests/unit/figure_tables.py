@@ -44,7 +44,7 @@ def balanced(n_spo: int) -> float:
 
 def fig1() -> dict[str, pd.DataFrame]:
     """Compute the true table of figure 1: it takes less than a second."""
-    from keystab.semigroup import semigroup_table
+    from keystab.scalespace.semigroup import semigroup_table
 
     return {"fig1": semigroup_table()}
 
@@ -400,7 +400,7 @@ NOISES = (0.005, 0.01, 0.015, 0.03, 0.035, 0.07, 0.075, 0.15)
 
 def _sweep_curves(column: str, harm: dict[float, float]) -> pd.DataFrame:
     """Invent stability curves of 32 views; `harm` is 0 (all keypoints stay) or more per value."""
-    from keystab.stability import stability_curve
+    from keystab.evaluation.stability import stability_curve
 
     draw = np.random.default_rng(10)
     parts = []
@@ -469,7 +469,7 @@ def fig11() -> dict[str, pd.DataFrame]:
 
 def fig12() -> dict[str, pd.DataFrame]:
     """Invent keypoints that noise makes unstable and rare, and compute its closed form."""
-    from keystab.noise import dog_noise
+    from keystab.scalespace.white_noise import dog_noise
 
     harm = {noise: 30 * noise for noise in NOISES}
     y, x = (grid.ravel() for grid in np.indices((64, 64)))
@@ -493,7 +493,7 @@ def fig12() -> dict[str, pd.DataFrame]:
 
 def figs2() -> dict[str, pd.DataFrame]:
     """Invent what 17 wrong blurs do in two octaves; the assumed one stands first, as in a set."""
-    from keystab.intervals import wilson_interval
+    from keystab.evaluation.intervals import wilson_interval
 
     blurs = (0.7, *(round(0.3 + 0.05 * k, 2) for k in range(17) if k != 8))
     rows = []
@@ -518,7 +518,7 @@ def figs2() -> dict[str, pd.DataFrame]:
 
 def figs3() -> dict[str, pd.DataFrame]:  # noqa: N802
     """Compute true tables of figure S3 at a few apertures: they take less than a second."""
-    from keystab.optics import optics_table, profile_table
+    from keystab.camera.optics import optics_table, profile_table
 
     profiles = profile_table(2.0, 4.5, count=41)
     return {"figS3": optics_table([1.4, 2.8, 5.6, 11.0], [4.5, 6.5]), "figS3_profiles": profiles}
@@ -526,7 +526,7 @@ def figs3() -> dict[str, pd.DataFrame]:  # noqa: N802
 
 def figs4() -> dict[str, pd.DataFrame]:  # noqa: N802
     """Invent detections of blobs: theory with small errors, none below the first scale."""
-    from keystab.blobs import dog_extremum_scale
+    from keystab.scalespace.gaussian_blobs import dog_extremum_scale
 
     draw = np.random.default_rng(8)
     ways = [("operator", "dog", kappa, 15, "refined", 0.8, 1e-3) for kappa in (1.1, KAPPA)]

@@ -8,9 +8,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
-from keystab import cosine
-from keystab.blob_tables import blob_table, laplacian_scale
-from keystab.blobs import (
+from keystab.errors import InputError
+from keystab.experiments.blob_scales import blob_table, laplacian_scale
+from keystab.io.tables import read_table
+from keystab.scalespace import cosine_series
+from keystab.scalespace.gaussian_blobs import (
     blob_image,
     dog_at_centre,
     dog_extremum_scale,
@@ -20,9 +22,7 @@ from keystab.blobs import (
     smallest_blob,
     variance_at_zero,
 )
-from keystab.errors import InputError
 from keystab.stages import detect_blobs, match_blobs
-from keystab.tables import read_table
 
 sizes, ratios, blurs = st.floats(1.5, 8.0), st.floats(1.01, 2.0), st.floats(0.0, 0.9)
 
@@ -76,12 +76,16 @@ def test_the_laplacian_is_the_limit_of_the_difference():
 def test_closed_forms_are_those_of_the_image():
     s, c, assumed, sigma, kappa = 2.0, 0.9, 0.6, 1.7, 1.3
     image = blob_image(s, c, (61, 63), (30.0, 31.0))
-    coefs = cosine.coefficients(image)
+    coefs = cosine_series.coefficients(image)
     lower, upper = (np.sqrt(scale**2 - assumed**2) for scale in (sigma, kappa * sigma))
-    dog = [float(cosine.evaluate(coefs, [30.0], [31.0], blur)[0, 0]) for blur in (upper, lower)]
+    dog = [
+        float(cosine_series.evaluate(coefs, [30.0], [31.0], blur)[0, 0]) for blur in (upper, lower)
+    ]
     expected = float(dog_at_centre(sigma, s, kappa, c, assumed))
     assert dog[0] - dog[1] == pytest.approx(expected, rel=1e-9)
-    second = [cosine.evaluate(coefs, [30.0], [31.0], lower, d)[0, 0] for d in ((2, 0), (0, 2))]
+    second = [
+        cosine_series.evaluate(coefs, [30.0], [31.0], lower, d)[0, 0] for d in ((2, 0), (0, 2))
+    ]
     expected = float(laplacian_at_centre(sigma, s, c, assumed))
     assert sigma**2 * sum(second) == pytest.approx(expected, rel=1e-9)
     assert image.sum() == pytest.approx(2 * np.pi * s**2, rel=1e-9)  # the camera loses no light

@@ -6,9 +6,9 @@ import pytest
 import scenes
 from numpy.testing import assert_allclose
 
-from keystab.blur_tables import blur_error_table
-from keystab.detection import detect_keypoints
-from keystab.intervals import wilson_interval
+from keystab.detection.detector import detect_keypoints
+from keystab.evaluation.intervals import wilson_interval
+from keystab.experiments.blur_errors import blur_error_table
 
 KAPPA, ASSUMED = 2 ** (1 / 3), 0.7
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}

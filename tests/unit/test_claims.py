@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from keystab import claims
 from keystab.errors import InputError
 from keystab.stages import judge_claims
+from keystab.study import claims
 
 ROOT = Path(__file__).parents[2]
 LEDGER = ROOT / "config/claims.yaml"

@@ -13,14 +13,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from keystab import cli, memory, scale_space
-from keystab.camera import simulate_view
-from keystab.detection import detect_keypoints
-from keystab.extrema import bytes_of_search
-from keystab.pictures import read_picture, write_picture
-from keystab.psf import fit_psf
-from keystab.tables import read_table
-from keystab.truth import true_extrema
+from keystab import scale_space
+from keystab.camera.psf_fit import fit_psf
+from keystab.camera.simulation import simulate_view
+from keystab.cli import main as cli
+from keystab.detection.detector import detect_keypoints
+from keystab.detection.extrema import bytes_of_search
+from keystab.io.pictures import read_picture, write_picture
+from keystab.io.tables import read_table
+from keystab.truth.true_extrema import true_extrema
+from keystab.utils import memory
 
 
 @pytest.fixture
@@ -223,7 +225,7 @@ def test_a_folder_in_the_place_of_the_output_survives(
     for name in ("folder.csv", "folder.npy"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "precious").write_text("kept")
-    monkeypatch.setattr("keystab.pictures.read_picture", None)  # refused before it is read
+    monkeypatch.setattr("keystab.io.pictures.read_picture", None)  # refused before it is read
     assert cli.main(command.replace("PICTURE", str(picture)).split()) == 2
     assert "is a folder; give a file name\n" in capsys.readouterr().err
     for name in ("folder.csv", "folder.npy"):
@@ -263,13 +265,22 @@ def test_blur_names_the_picture_that_it_cannot_fit(tmp_path, capsys, values, wor
 
 def test_compiled_code_that_can_be_kept_nowhere_gets_one_line(picture, tmp_path):
     # As in a container that runs for a user who may write neither to the package nor to a home.
-    source = Path(cli.__file__).parent
+    source = Path(cli.__file__).parents[1]
     package = tmp_path / "library" / "keystab"
     shutil.copytree(source, package, ignore=shutil.ignore_patterns("__pycache__"))
-    (package / "__pycache__").write_text("no folder")
+    for room in [package, *(path for path in package.iterdir() if path.is_dir())]:
+        (room / "__pycache__").write_text("no folder")
     nowhere = {"HOME": str(picture), "XDG_CACHE_HOME": str(picture)}
     environment = {name: os.environ[name] for name in os.environ if name != "NUMBA_CACHE_DIR"}
-    command = [sys.executable, "-m", "keystab.cli", "detect", str(picture), "--camera-blur", "0.8"]
+    command = [
+        sys.executable,
+        "-m",
+        "keystab.cli",
+        "detect",
+        str(picture),
+        "--camera-blur",
+        "0.8",
+    ]
     ended = subprocess.run(
         command,
         env=environment | nowhere | {"PYTHONPATH": str(package.parent)},
@@ -285,7 +296,9 @@ def test_one_keypoint_is_singular(picture, tmp_path, monkeypatch, capsys):
     found = detect_keypoints(read_picture(picture), 0.8, n_oct=2)
     for n, words in ((0, "0 keypoints in"), (1, "1 keypoint in"), (2, "2 keypoints in")):
         table = pd.concat([found[:1]] * n) if n else found[:0]
-        monkeypatch.setattr("keystab.detection.detect_keypoints", lambda *_, t=table, **__: t)
+        monkeypatch.setattr(
+            "keystab.detection.detector.detect_keypoints", lambda *_, t=table, **__: t
+        )
         assert cli.main(["detect", str(picture), "--camera-blur", "0.8"]) == 0
         assert words in capsys.readouterr().err
 
@@ -314,7 +327,7 @@ def test_memory_estimate_bounds_what_is_taken(picture, options):
 def test_help_and_version_need_nothing_heavy():
     code = (
         "import sys\n"
-        "from keystab import cli\n"
+        "from keystab.cli import main as cli\n"
         "try:\n    cli.main(['detect', '--help'])\n"
         "except SystemExit as end:\n    assert end.code == 0\n"
         "assert not {'numpy', 'pandas', 'zarr'} & set(sys.modules)\n"

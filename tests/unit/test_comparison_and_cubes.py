@@ -6,10 +6,22 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from keystab.comparison import comparable
-from keystab.cubes import HALF, cubes_around, dense_scale_space, drawn, nearest_extrema, places
 from keystab.errors import InputError
-from keystab.sampling_tables import change_counts, long_matches, match_samplings, summary
+from keystab.experiments.local_volumes import (
+    HALF,
+    cubes_around,
+    dense_scale_space,
+    drawn,
+    nearest_extrema,
+    places,
+)
+from keystab.experiments.sampling_stability import (
+    change_counts,
+    long_matches,
+    match_samplings,
+    summary,
+)
+from keystab.matching.common_range import comparable
 from keystab.stages._inputs import positions_of_matches
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystab.covering import first_minimum_cover
+from keystab.matching.set_cover import first_minimum_cover
 
 
 def first_by_enumeration(candidates):

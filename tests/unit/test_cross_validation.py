@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystab.cross_validation import block_splits, blocks, folds, picture_split, scores
 from keystab.errors import InputError
-from keystab.jets import DogSeries
-from keystab.prediction_tables import described, score_predictors
-from keystab.predictors import PREDICTORS
-from keystab.roc import area_under_curve
-from keystab.stratified_roc import Detections, areas, mean_curve, rejected
+from keystab.evaluation.cross_validation import block_splits, blocks, folds, picture_split, scores
+from keystab.evaluation.roc import area_under_curve
+from keystab.evaluation.stratified_roc import Detections, areas, mean_curve, rejected
+from keystab.experiments.predictor_scores import described, score_predictors
+from keystab.prediction.predictors import PREDICTORS
+from keystab.scalespace.continuous_dog import DogSeries
 
 PHI = NormalDist().cdf
 

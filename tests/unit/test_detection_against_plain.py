@@ -7,10 +7,10 @@ import plain_detector as plain
 import pytest
 from scenes import blobs
 
-from keystab import extrema, refinement
-from keystab.detection import detect_keypoints, extrema_table
-from keystab.dog_space import scale_space
-from keystab.sampling import balanced_delta
+from keystab.detection import extrema, refinement
+from keystab.detection.detector import detect_keypoints, extrema_table
+from keystab.scalespace.dog import scale_space
+from keystab.scalespace.sampling import balanced_delta
 
 KAPPA = 2 ** (1 / 3)
 

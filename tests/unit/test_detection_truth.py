@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import blob, blobs
 
-from keystab.detection import detect_keypoints
-from keystab.dog_space import scale_space
+from keystab.detection.detector import detect_keypoints
+from keystab.detection.extrema import discrete_extrema
 from keystab.errors import InputError
-from keystab.extrema import discrete_extrema
-from keystab.operators import SplineAxis, cosine_domain_kernel
-from keystab.sampling import balanced_delta
+from keystab.scalespace.dog import scale_space
+from keystab.scalespace.operators import SplineAxis, cosine_domain_kernel
+from keystab.scalespace.sampling import balanced_delta
 
 KAPPA = 2 ** (1 / 3)
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystab.differences import ATOL, RTOL, difference, file_difference
-from keystab.tables import write_table
+from keystab.io.tables import write_table
+from keystab.provenance.table_differences import ATOL, RTOL, difference, file_difference
 
 TABLE = pd.DataFrame(
     {

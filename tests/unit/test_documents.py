@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 import yaml
 
-from keystab import cli, scale_space
-from keystab.stores import write_scale_space, write_views
-from keystab.views import ViewSpec
+from keystab import scale_space
+from keystab.camera.views import ViewSpec
+from keystab.cli import main as cli
+from keystab.io.scale_space_store import write_scale_space, write_views
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(

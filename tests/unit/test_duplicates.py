@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from keystab.duplicates import matched, pairs_between, pairs_within, same
 from keystab.errors import InputError
+from keystab.matching.correspondence import matched, pairs_between, pairs_within, same
 
 ROOT2 = 2**0.5
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from keystab import feasibility, settings
+from keystab.camera.view_sets import per_view, view_shapes, view_specs
 from keystab.errors import InputError
-from keystab.view_sets import per_view, view_shapes, view_specs
+from keystab.study import feasibility, settings
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())

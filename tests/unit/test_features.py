@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from keystab.errors import InputError
-from keystab.features import DIRECTIONS, condition_numbers, feature_table, normalised
+from keystab.prediction.features import DIRECTIONS, condition_numbers, feature_table, normalised
 
 NAMES = ("s", "y", "x")
 

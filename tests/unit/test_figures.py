@@ -13,8 +13,8 @@ from keystab import __version__
 from keystab.errors import InputError
 from keystab.figures import style
 from keystab.figures._render import check_tables, main, read_tables, save
-from keystab.passports import PNG_KEY, Passport, digests_of
-from keystab.tables import write_table
+from keystab.io.figure_metadata import PNG_KEY, Passport, digests_of
+from keystab.io.tables import write_table
 
 NUMBERS = (*range(1, 13), "S1", "S2", "S3", "S4")
 

@@ -7,7 +7,7 @@ import subprocess
 import pytest
 
 from keystab.errors import InputError
-from keystab.files import check_writable, written_whole
+from keystab.utils.files import check_writable, written_whole
 
 
 def test_failure_leaves_what_was_there(tmp_path):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from keystab import fingerprint as room
+from keystab.provenance import code_digest as room
 
 FILES = {
     "__init__.py": '"""Names."""\n__version__ = "1"\n',
@@ -173,11 +173,20 @@ def test_uses_of_a_catalogue_that_cannot_be_followed_are_refused(painted, name, 
         taken(painted, "toy.figures.ink")
 
 
-def test_compiled_loops_are_kept_apart_for_other_code_of_what_they_call(toy):
-    (toy / "loops.py").write_text("\nfrom numba import njit\nfrom toy.base import double\n")
+@pytest.mark.parametrize("folder", ["", "near/", "far/away/"])
+@pytest.mark.parametrize("edited", ["the loop", "what it calls"])
+def test_compiled_loops_are_kept_apart_for_other_code(toy, folder, edited):
+    for part in [*Path(folder).parents, Path(folder)]:
+        (toy / part).mkdir(exist_ok=True)
+        (toy / part / "__init__.py").touch()
+    loops = toy / folder / "loops.py"
+    loops.write_text("\nfrom numba import njit\nfrom toy.base import double\n")
     room._read.cache_clear()
     before = room.folder_of_loops(toy, toy)
-    (toy / "base.py").write_text(FILES["base.py"].replace("2 * x", "3 * x"))
+    if edited == "the loop":
+        loops.write_text(loops.read_text() + "TWO = double(1)\n")
+    else:
+        (toy / "base.py").write_text(FILES["base.py"].replace("2 * x", "3 * x"))
     room._read.cache_clear()
     assert room.folder_of_loops(toy, toy) != before
 
@@ -187,6 +196,6 @@ def test_every_stage_and_figure_of_the_study_can_be_followed():
         for path in (room.PACKAGE_FOLDER / folder).glob("*.py"):
             name = f"keystab.{folder}" + ("" if path.stem == "__init__" else f".{path.stem}")
             assert name in room.imported_modules(name)
-    assert "keystab.extrema" in room.imported_modules("keystab.stages.detect")
-    assert "keystab.extrema" not in room.imported_modules("keystab.stages.simulate")
-    assert "keystab.detection" not in room.imported_modules("keystab.figures.fig1")
+    assert "keystab.detection.extrema" in room.imported_modules("keystab.stages.detect")
+    assert "keystab.detection.extrema" not in room.imported_modules("keystab.stages.simulate")
+    assert "keystab.detection.detector" not in room.imported_modules("keystab.figures.fig1")

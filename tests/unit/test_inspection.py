@@ -4,20 +4,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from keystab import stores
-from keystab.camera import ViewSpec
-from keystab.dog_space import scale_space
+from keystab.camera.simulation import ViewSpec
 from keystab.errors import InputError
-from keystab.inspection import describe
-from keystab.seals import write_seal
-from keystab.tables import write_table
+from keystab.io import scale_space_store
+from keystab.io.checksums import write_seal
+from keystab.io.describe import describe
+from keystab.io.tables import write_table
+from keystab.scalespace.dog import scale_space
 
 IMAGE = np.random.default_rng(0).random((12, 16))
 
 
 def test_scale_space(tmp_path):
     space = scale_space(IMAGE, camera_blur=0.5, n_spo=2, delta_min=0.5, sigma_min=1.0)
-    stores.write_scale_space(space, tmp_path / "n2")
+    scale_space_store.write_scale_space(space, tmp_path / "n2")
     text = describe(tmp_path / "n2")
     assert "difference-of-Gaussians scale-space" in text
     assert "4 slices, sigma 1 to 2.82843 pixels" in text
@@ -34,7 +34,7 @@ def test_scale_space(tmp_path):
 
 def test_views(tmp_path):
     specs = [ViewSpec(blur, 10.0, (12, 16)) for blur in (0.5, 1.1)]
-    stores.write_views([IMAGE, IMAGE], specs, tmp_path, {"set": "examples"})
+    scale_space_store.write_views([IMAGE, IMAGE], specs, tmp_path, {"set": "examples"})
     text = describe(tmp_path)
     assert "2 simulated views of float32" in text
     assert "camera blur 0.5 to 1.1 pixels" in text and "step 10 reference pixels" in text

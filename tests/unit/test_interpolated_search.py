@@ -10,21 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import blobs
 
-from keystab import band_limited_search, extrema, interpolated_search
-from keystab.band_limited_search import BandLimitedSearch
-from keystab.block_rows import axis_blocks
-from keystab.block_scan import scan
-from keystab.dog_space import scale_space
-from keystab.interpolated_search import InterpolatedSearch, applies, expansion
+from keystab.detection import extrema, search_cosine, search_spline
+from keystab.detection.search_cosine import BandLimitedSearch
+from keystab.detection.search_rows import axis_blocks
+from keystab.detection.search_scan import scan
+from keystab.detection.search_spline import InterpolatedSearch, applies, expansion
+from keystab.scalespace.dog import scale_space
 
 
 def both(image, n_spo, epsilon=0.0, camera_blur=1.1, **options):
     """Extrema of the two searches."""
     space = scale_space(image, camera_blur, n_spo, **options)
-    assert applies(space) or band_limited_search.applies(space)
+    assert applies(space) or search_cosine.applies(space)
     with (
-        patch.object(interpolated_search, "applies", return_value=False),
-        patch.object(band_limited_search, "applies", return_value=False),
+        patch.object(search_spline, "applies", return_value=False),
+        patch.object(search_cosine, "applies", return_value=False),
     ):
         dense = extrema.discrete_extrema(space, epsilon)
     return extrema.discrete_extrema(space, epsilon), dense
@@ -147,9 +147,7 @@ def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
             box = dog[:, top : top + search.length, left : left + search.length]
             interpolated = expand @ box[:, nodes][:, :, nodes] @ expand.T
             off = np.abs(interpolated - box).max(axis=(1, 2))
-            bound = bounds[j // interpolated_search._ABREAST][
-                i, :, j % interpolated_search._ABREAST
-            ]
+            bound = bounds[j // search_spline._ABREAST][i, :, j % search_spline._ABREAST]
             assert (off <= bound + 1e-14).all()
             reached = max(reached, (off / bound)[:4].max())
     assert reached > 1e-3
@@ -172,7 +170,7 @@ def test_the_bound_of_band_limited_interpolation_holds(kind, n_spo):
     search = BandLimitedSearch(space, 0.0, *extrema.inner_window(space))
     dog = space.window()
     (y_nodes, along), (x_nodes, across) = (
-        band_limited_search.interpolation(length, space.sampling.step)
+        search_cosine.interpolation(length, space.sampling.step)
         for length in (search.length, search.abreast)
     )
     reached = 0.0
@@ -187,7 +185,7 @@ def test_the_bound_of_band_limited_interpolation_holds(kind, n_spo):
 
 
 def test_blocks_with_too_many_candidates_are_evaluated(monkeypatch):
-    monkeypatch.setattr(interpolated_search, "_KINKED", 0.0)  # slice 1 is then all candidates
+    monkeypatch.setattr(search_spline, "_KINKED", 0.0)  # slice 1 is then all candidates
     image = blobs((31, 43), 3)
     found, dense = both(image, 15)
     space = scale_space(image, 1.1, 15)
@@ -198,7 +196,7 @@ def test_blocks_with_too_many_candidates_are_evaluated(monkeypatch):
 
 def test_coarse_and_small_scale_spaces_are_not_interpolated():
     image = blobs((40, 40), 4)
-    for oversampling, asked in (("spline", applies), ("cosine", band_limited_search.applies)):
+    for oversampling, asked in (("spline", applies), ("cosine", search_cosine.applies)):
         assert asked(scale_space(image, 1.1, 15, oversampling=oversampling))
         assert not asked(scale_space(image, 1.1, 3, oversampling=oversampling))
         assert not asked(scale_space(image[:9, :9], 1.1, 15, oversampling=oversampling))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from keystab.errors import InputError
-from keystab.intervals import (
+from keystab.evaluation.intervals import (
     bootstrap_counts,
     centred_interval,
     percentile_interval,

@@ -9,12 +9,18 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scenes import blobs
 
-from keystab.detection import detect_keypoints, extrema_table
-from keystab.dog_space import scale_space
-from keystab.extrema import discrete_extrema
-from keystab.judgement import causes, judged, kept_and_lost, mean_over_views, partners
-from keystab.refinement import MOST_MODELS, trace
-from keystab.truth import true_extrema
+from keystab.detection.detector import detect_keypoints, extrema_table
+from keystab.detection.extrema import discrete_extrema
+from keystab.detection.refinement import MOST_MODELS, trace
+from keystab.evaluation.recall_precision import (
+    causes,
+    judged,
+    kept_and_lost,
+    mean_over_views,
+    partners,
+)
+from keystab.scalespace.dog import scale_space
+from keystab.truth.true_extrema import true_extrema
 
 
 def points(seed: int, n: int) -> pd.DataFrame:

@@ -9,9 +9,10 @@ import pandas as pd
 import pytest
 import scenes
 
-from keystab.features import DIRECTIONS
-from keystab.judgement import CAUSES
-from keystab.pictures import write_picture
+from keystab.evaluation.recall_precision import CAUSES
+from keystab.io.pictures import write_picture
+from keystab.io.tables import read_table, write_table
+from keystab.prediction.features import DIRECTIONS
 from keystab.stages import (
     detect,
     find_truth,
@@ -23,7 +24,6 @@ from keystab.stages import (
     judge_views,
     simulate,
 )
-from keystab.tables import read_table, write_table
 
 KAPPA = 2 ** (1 / 3)
 SHAPE = (60, 70)

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from scenes import blob
 
+from keystab.detection.refinement import refined_keypoints
+from keystab.detection.sift_filters import passes_filters
+from keystab.detection.view_detector import Detector, detect_in_view
 from keystab.errors import InputError
-from keystab.kappa_tables import common_normalised_scales, kappa_tables
-from keystab.refinement import refined_keypoints
-from keystab.shipped import passes_filters
-from keystab.view_detection import Detector, detect_in_view
+from keystab.experiments.kappa_stability import common_normalised_scales, kappa_tables
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
 KAPPAS = [2 ** (1 / 30), 2 ** (1 / 6), 2**0.5]

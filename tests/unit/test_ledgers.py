@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 import yaml
 
-from keystab import claims, ledgers
 from keystab.errors import InputError
+from keystab.io.tables import read_table
 from keystab.stages import compare_claims
-from keystab.tables import read_table
+from keystab.study import claims, claims_by_scene
 
 RATE = {"table": "rates", "column": "rate", "take": "max", "low": "low", "high": "high"}
 COUNT = {"table": "rates", "column": "n", "take": "max"}
@@ -118,18 +118,18 @@ def overlays(folder, **given):
 def test_pictures_are_named_by_their_files_and_found_in_their_results(tmp_path, monkeypatch):
     lake = {"reference": "/pictures/lake 2.tif", "results": "results/lake"}
     base, second = overlays(tmp_path, lake=lake)
-    found = ledgers.sources(base, [base, second])
+    found = claims_by_scene.sources(base, [base, second])
     assert found == [
         ("hill", "results/claims.csv", base),
         ("lake_2", "results/lake/claims.csv", second),
     ]
     monkeypatch.chdir(tmp_path)
     line = f"results/lake/claims.csv is missing; make it first: make results/lake/claims.md WITH={second}"
-    assert ledgers.missing(found, made="results/claims.csv") == [line]
+    assert claims_by_scene.missing(found, made="results/claims.csv") == [line]
     (tmp_path / "results/lake").mkdir(parents=True)
     (tmp_path / "results/lake/claims.csv").touch()
-    assert ledgers.missing(found, made="results/claims.csv") == []
-    (other,) = ledgers.missing(found, made="results/lake/claims.csv")
+    assert claims_by_scene.missing(found, made="results/claims.csv") == []
+    (other,) = claims_by_scene.missing(found, made="results/lake/claims.csv")
     assert other.startswith("results/claims.csv is missing;")
 
 
@@ -143,4 +143,4 @@ def test_pictures_are_named_by_their_files_and_found_in_their_results(tmp_path, 
 def test_pictures_that_share_a_name_or_results_are_refused(tmp_path, lake, says):
     base, second = overlays(tmp_path, lake=lake)
     with pytest.raises(InputError, match=re.escape(f"{base} and {second} {says}")):
-        ledgers.sources(base, [base, second])
+        claims_by_scene.sources(base, [base, second])

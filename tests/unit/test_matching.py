@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from keystab.errors import InputError
-from keystab.matching import gather, matches, occurrence, unique_keypoints
+from keystab.matching.unique_keypoints import gather, matches, occurrence, unique_keypoints
 
 COLUMNS = ["y", "x", "sigma", "sign", "set"]
 

@@ -4,8 +4,8 @@ import mmap
 
 import pytest
 
-from keystab import memory
 from keystab.errors import InputError
+from keystab.utils import memory
 
 
 def test_available_memory_is_plausible():

@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from keystab.dog_space import scale_space
 from keystab.errors import InputError
-from keystab.noise import dog_noise, gaussian_noise
+from keystab.scalespace.dog import scale_space
+from keystab.scalespace.white_noise import dog_noise, gaussian_noise
 
 KAPPA = 2 ** (1 / 3)
 

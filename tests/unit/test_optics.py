@@ -8,8 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq, minimize
 from scipy.special import erf, j1
 
-from keystab.errors import InputError
-from keystab.optics import (
+from keystab.camera.optics import (
     MODELS,
     Camera,
     camera,
@@ -21,6 +20,7 @@ from keystab.optics import (
     profile_table,
     psf_profile,
 )
+from keystab.errors import InputError
 
 # The Gaussian nearest to a box of side 1: c^2 erf(u)^2 / c is greatest at u = 1 / (sqrt(8) c).
 BOX = 1 / (np.sqrt(8) * brentq(lambda u: erf(u) - 4 * u * np.exp(-(u**2)) / np.sqrt(np.pi), 0.5, 2))

@@ -9,35 +9,44 @@ import sys
 
 import pytest
 
-from keystab.outdated_loops import PACKAGE_FOLDER, STAMP, forget_outdated
+from keystab.provenance.compiled_loops import PACKAGE_FOLDER, STAMP, forget_outdated
+
+ROOMS = (".", "near", "far/away")
 
 
 @pytest.fixture
 def package(tmp_path):
-    """A package with two modules and their compiled loops."""
-    (tmp_path / "__pycache__").mkdir()
-    for name in ("caller.py", "called.py"):
-        (tmp_path / name).write_text("LIMIT = 3\n")
+    """A package with two modules in each of two rooms and beside them, and their compiled loops."""
+    for room in ROOMS:
+        (tmp_path / room / "__pycache__").mkdir(parents=True)
+        for name in ("caller.py", "called.py"):
+            (tmp_path / room / name).write_text("LIMIT = 3\n")
     forget_outdated(tmp_path)
-    for name in ("caller.loop.nbi", "caller.loop.1.nbc", "caller.pyc"):
-        (tmp_path / "__pycache__" / name).touch()
+    for room in ROOMS:
+        for name in ("caller.loop.nbi", "caller.loop.1.nbc", "caller.pyc"):
+            (tmp_path / room / "__pycache__" / name).touch()
     return tmp_path
 
 
 def kept(package):
-    return {path.name for path in (package / "__pycache__").iterdir()} - {STAMP}
+    """What lies beside the modules of each room, without the stamp."""
+    folders = {room: package / room / "__pycache__" for room in ROOMS}
+    return {
+        room: {path.name for path in folder.iterdir()} - {STAMP} for room, folder in folders.items()
+    }
 
 
+@pytest.mark.parametrize("room", ROOMS)  # where the edited module is
 @pytest.mark.parametrize("seconds", [-1e6, 0, 1e9])  # before, with and after the compiled loops
-def test_a_changed_module_outdates_the_loops_of_all_whatever_its_time(package, seconds):
+def test_a_changed_module_outdates_the_loops_of_all_whatever_its_time(package, seconds, room):
     assert not forget_outdated(package)
-    assert len(kept(package)) == 3
-    module = package / "called.py"
+    assert all(len(names) == 3 for names in kept(package).values())
+    module = package / room / "called.py"
     time = module.stat().st_mtime + seconds
     module.write_text("LIMIT = 30\n")
     os.utime(module, (time, time))
     assert forget_outdated(package)
-    assert kept(package) == {"caller.pyc"}
+    assert kept(package) == {room: {"caller.pyc"} for room in ROOMS}
     assert not forget_outdated(package)
 
 
@@ -45,17 +54,17 @@ def test_a_removal_that_another_process_was_faster_at_goes_on(package, monkeypat
     (package / "called.py").write_text("LIMIT = 30\n")
     glob = type(package).glob
     monkeypatch.setattr(
-        type(package), "glob", lambda folder, of: [folder / f"gone{of[1:]}", *glob(folder, of)]
+        type(package), "glob", lambda folder, of: [folder / "gone.nbi", *glob(folder, of)]
     )
     assert forget_outdated(package)
-    assert kept(package) == {"caller.pyc"}
+    assert kept(package) == {room: {"caller.pyc"} for room in ROOMS}
 
 
 def test_the_library_does_so_when_it_is_imported(tmp_path):
     shutil.copytree(
         PACKAGE_FOLDER, tmp_path / "keystab", ignore=shutil.ignore_patterns("__pycache__")
     )
-    old = tmp_path / "keystab" / "__pycache__" / "extrema.old.nbi"
+    old = tmp_path / "keystab" / "detection" / "__pycache__" / "extrema.old.nbi"
     old.parent.mkdir()
     old.touch()
     command = [sys.executable, "-c", "import keystab; print(keystab.__file__)"]

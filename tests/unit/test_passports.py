@@ -15,12 +15,13 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 from pypdf import PdfReader, PdfWriter
 
-from keystab import __version__, cli
+from keystab import __version__
+from keystab.cli import main as cli
 from keystab.errors import InputError
 from keystab.figures._render import main, save
-from keystab.passports import PNG_KEY, Passport, digests_of
-from keystab.provenance import read_passport
-from keystab.tables import write_table
+from keystab.io.figure_metadata import PNG_KEY, Passport, digests_of
+from keystab.io.tables import write_table
+from keystab.provenance.lineage import read_passport
 
 DIGEST = st.text("0123456789abcdef", min_size=64, max_size=64)
 SIMPLE = st.text(st.characters(codec="utf-8"), max_size=8)

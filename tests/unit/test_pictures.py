@@ -9,7 +9,7 @@ import tifffile
 from PIL import Image
 
 from keystab.errors import InputError
-from keystab.pictures import picture_shape, pixel_digest, read_picture, write_picture
+from keystab.io.pictures import picture_shape, pixel_digest, read_picture, write_picture
 
 LEVELS = np.array([[0, 51, 102], [153, 204, 255]], dtype=np.uint8)
 COLOUR = np.random.default_rng(0).integers(0, 256, (5, 4, 3), dtype=np.uint8)

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from keystab.errors import InputError
-from keystab.intervals import table_counts
-from keystab.precision import mean_precision, precision
+from keystab.evaluation.intervals import table_counts
+from keystab.evaluation.localization import mean_precision, precision
 
 
 def repeated(n_keypoints, n_sets, draw):

@@ -10,7 +10,7 @@ import pytest
 from keystab.errors import InputError
 from keystab.figures import predictors, style
 from keystab.figures._render import save
-from keystab.predictors import MODELS, PREDICTORS
+from keystab.prediction.predictors import MODELS, PREDICTORS
 
 PICTURES = ("one", "two", "three")
 

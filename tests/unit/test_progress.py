@@ -4,8 +4,8 @@ import io
 
 import pytest
 
-from keystab import progress as module
-from keystab.progress import progress
+from keystab.utils import progress as module
+from keystab.utils.progress import progress
 
 
 class Clock:

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import erf
 
+from keystab.camera.psf_fit import border_level, fit_psf
 from keystab.errors import InputError
-from keystab.psf import border_level, fit_psf
 
 
 def bump(shape=(41, 47), y=20.3, x=22.6, major=3.0, minor=3.0, angle=0.0, height=1.0):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 
-from keystab.records import FOLDER, read_records, settings_behind, upstream
+from keystab.provenance.snakemake_records import FOLDER, read_records, settings_behind, upstream
 
 FIELDS = {
     "rule": "make", "input": [], "shellcmd": "make  \n it", "params": [], "input_checksums": {},

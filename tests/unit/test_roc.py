@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from keystab.errors import InputError
-from keystab.roc import area_under_curve, auc_interval, auc_table, roc, threshold_curve
+from keystab.evaluation.roc import area_under_curve, auc_interval, auc_table, roc, threshold_curve
 
 VALUES = st.lists(st.integers(-3, 3).map(float) | st.just(np.inf), min_size=1, max_size=12)
 DIRECTION = st.sampled_from([1, -1])

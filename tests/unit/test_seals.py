@@ -7,7 +7,7 @@ import subprocess
 import pytest
 
 from keystab.errors import InputError
-from keystab.seals import seal, verify, write_seal
+from keystab.io.checksums import seal, verify, write_seal
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import curve_fit
 
 from keystab.errors import InputError
-from keystab.semigroup import (
+from keystab.scalespace.semigroup import (
     METHODS,
     SIGMAS,
     blob_profile,

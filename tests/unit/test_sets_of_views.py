@@ -12,12 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from keystab.camera import Scene, simulate
-from keystab.detection import detect_keypoints
-from keystab.duplicates import matched
-from keystab.refinement import refined_keypoints
-from keystab.view_detection import Detector, detect_in_view
-from keystab.view_sets import (
+from keystab.camera.simulation import Scene, simulate
+from keystab.camera.view_sets import (
     common_scales,
     expanded,
     in_common_field,
@@ -28,7 +24,11 @@ from keystab.view_sets import (
     view_specs,
     windows_of_common_field,
 )
-from keystab.view_tables import (
+from keystab.camera.views import ViewSpec, to_reference, to_view
+from keystab.detection.detector import detect_keypoints
+from keystab.detection.refinement import refined_keypoints
+from keystab.detection.view_detector import Detector, detect_in_view
+from keystab.experiments.view_stability import (
     CommonRange,
     count_table,
     curve_table,
@@ -36,7 +36,7 @@ from keystab.view_tables import (
     precision_table,
     scale_table,
 )
-from keystab.views import ViewSpec, to_reference, to_view
+from keystab.matching.correspondence import matched
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
 PLAIN = {

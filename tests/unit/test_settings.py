@@ -10,8 +10,8 @@ import jsonschema
 import pytest
 import yaml
 
-from keystab import settings
 from keystab.errors import InputError
+from keystab.study import settings
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
@@ -112,7 +112,7 @@ def test_all_problems_are_listed():
 
 
 def test_as_many_models_are_allowed_as_paths_have():
-    from keystab.refinement import MOST_MODELS
+    from keystab.detection.refinement import MOST_MODELS
 
     given = {"refinement": {"max_iterations": MOST_MODELS}}
     assert settings.checked(given, SCHEMA)["refinement"]["max_iterations"] == MOST_MODELS

@@ -7,12 +7,16 @@ import pandas as pd
 import pytest
 from scenes import blobs
 
-from keystab.dog_space import scale_space
+from keystab.detection.extrema import discrete_extrema, extrema_of_array
+from keystab.detection.single_precision import (
+    quantised,
+    single_precision_extrema,
+    single_precision_window,
+)
 from keystab.errors import InputError
-from keystab.extrema import discrete_extrema, extrema_of_array
+from keystab.experiments.sampling_stability import floor_summary
 from keystab.figures import floor
-from keystab.sampling_tables import floor_summary
-from keystab.single_precision import quantised, single_precision_extrema, single_precision_window
+from keystab.scalespace.dog import scale_space
 
 
 @pytest.mark.parametrize("oversampling", ["spline", "cosine"])
@@ -42,7 +46,7 @@ def test_blocks_do_not_show(monkeypatch):
     space = scale_space(blobs((30, 40), 3), 1.1, 4)
     whole = single_precision_window(space, (0, space.shape[1]), (0, space.shape[2]))
     expected = extrema_of_array(whole, 1e-7)
-    monkeypatch.setattr("keystab.single_precision._BLOCK", 16)
+    monkeypatch.setattr("keystab.detection.single_precision._BLOCK", 16)
     assert {tuple(row) for row in single_precision_extrema(space, 1e-7)} == {
         tuple(row) for row in expected
     }

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from keystab.errors import InputError
-from keystab.intervals import table_counts, wilson_interval
-from keystab.stability import (
+from keystab.evaluation.intervals import table_counts, wilson_interval
+from keystab.evaluation.stability import (
     keypoint_features,
     label,
     new_and_lost,

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from keystab.figures import _render, fig4
-from keystab.pictures import pixel_digest, write_picture
+from keystab.io.pictures import pixel_digest, write_picture
+from keystab.io.tables import read_table
 from keystab.stages import (
     _run,
     count_refined,
@@ -26,7 +27,6 @@ from keystab.stages import (
     score_predictors,
     simulate,
 )
-from keystab.tables import read_table
 
 STAGES = sorted(
     path.stem for path in (Path(_run.__file__).parent).glob("*.py") if not path.stem.startswith("_")
@@ -235,7 +235,7 @@ def test_refined_keypoints_are_counted_with_and_without_an_upper_end(reference, 
 
 def test_the_truth_is_that_of_the_stored_view(reference, tmp_path):
     from keystab.stages._inputs import read_view
-    from keystab.truth import true_extrema
+    from keystab.truth.true_extrema import true_extrema
 
     assert simulate.main(view_arguments(reference, tmp_path, step="5", blur="0.9")) == 0
     given = [str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]

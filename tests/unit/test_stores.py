@@ -12,10 +12,11 @@ import textwrap
 import numpy as np
 import pytest
 
-from keystab import memory, stores
-from keystab.camera import ViewSpec
+from keystab.camera.simulation import ViewSpec
 from keystab.errors import InputError
-from keystab.seals import seal
+from keystab.io import scale_space_store
+from keystab.io.checksums import seal
+from keystab.utils import memory
 
 
 class Space:
@@ -42,12 +43,12 @@ WHOLE = Space().window(slice(None), slice(None), slice(None))
 
 @pytest.fixture
 def store(tmp_path):
-    stores.write_scale_space(Space(), tmp_path / "n1", {"image_sha256": "abc"}, tile=32)
+    scale_space_store.write_scale_space(Space(), tmp_path / "n1", {"image_sha256": "abc"}, tile=32)
     return tmp_path / "n1"
 
 
 def test_scale_space_round_trip(store):
-    space = stores.open_scale_space(store)
+    space = scale_space_store.open_scale_space(store)
     assert space["dog"].dims == ("scale", "y", "x")
     np.testing.assert_array_equal(space["dog"].to_numpy(), WHOLE)
     assert space["dog"].dtype == np.float64
@@ -61,12 +62,14 @@ def test_scale_space_round_trip(store):
 
 @pytest.mark.parametrize("tile", [7, 32, 50, 128])
 def test_tiling_does_not_show(tmp_path, tile):
-    stores.write_scale_space(Space(), tmp_path, tile=tile)
-    np.testing.assert_array_equal(stores.open_scale_space(tmp_path)["dog"].to_numpy(), WHOLE)
+    scale_space_store.write_scale_space(Space(), tmp_path, tile=tile)
+    np.testing.assert_array_equal(
+        scale_space_store.open_scale_space(tmp_path)["dog"].to_numpy(), WHOLE
+    )
 
 
 def test_windows_are_read_lazily_and_exactly(store):
-    space = stores.StoredScaleSpace(store)
+    space = scale_space_store.StoredScaleSpace(store)
     box = (slice(1, 3), slice(30, 66), slice(40, 50))
     np.testing.assert_array_equal(space.window(*box), WHOLE[box])
     np.testing.assert_array_equal(space.window(), WHOLE)
@@ -90,12 +93,14 @@ def test_one_row_of_tiles_at_a_time(tmp_path):
             asked.append((rows.start, rows.stop))
             return super().window(slices, rows, columns)
 
-    stores.write_scale_space(Watched(), tmp_path, tile=32)
+    scale_space_store.write_scale_space(Watched(), tmp_path, tile=32)
     assert asked == [(0, 32), (32, 64), (64, 70)]
 
 
 def test_same_scale_space_same_bytes(store, tmp_path):
-    stores.write_scale_space(Space(), tmp_path / "again", {"image_sha256": "abc"}, tile=32)
+    scale_space_store.write_scale_space(
+        Space(), tmp_path / "again", {"image_sha256": "abc"}, tile=32
+    )
     assert seal(tmp_path / "again") == seal(store)
 
 
@@ -103,8 +108,8 @@ def test_an_older_store_is_replaced(store):
     class Other(Space):
         sigma = Space.sigma * 2
 
-    stores.write_scale_space(Other(), store, tile=50)
-    np.testing.assert_array_equal(stores.open_scale_space(store)["sigma"], Other.sigma)
+    scale_space_store.write_scale_space(Other(), store, tile=50)
+    np.testing.assert_array_equal(scale_space_store.open_scale_space(store)["sigma"], Other.sigma)
     assert os.listdir(store) == ["data.zarr"]
 
 
@@ -116,7 +121,7 @@ def test_failing_writer_leaves_no_store(tmp_path):
             return super().window(slices, rows, columns)
 
     with pytest.raises(RuntimeError, match="halfway"):
-        stores.write_scale_space(Failing(), tmp_path / "n1", tile=32)
+        scale_space_store.write_scale_space(Failing(), tmp_path / "n1", tile=32)
     assert os.listdir(tmp_path / "n1") == []
 
 
@@ -126,7 +131,7 @@ def test_killed_writer_leaves_no_store(tmp_path):
         from pathlib import Path
         sys.path.insert(0, sys.argv[2])
         from test_stores import Space
-        from keystab import stores
+        from keystab.io import scale_space_store
 
         class Killed(Space):
             def window(self, slices, rows, columns):
@@ -134,7 +139,7 @@ def test_killed_writer_leaves_no_store(tmp_path):
                     os.kill(os.getpid(), signal.SIGKILL)
                 return super().window(slices, rows, columns)
 
-        stores.write_scale_space(Killed(), sys.argv[1], tile=32)
+        scale_space_store.write_scale_space(Killed(), sys.argv[1], tile=32)
     """
     here = os.path.dirname(__file__)
     run = subprocess.run(
@@ -145,7 +150,7 @@ def test_killed_writer_leaves_no_store(tmp_path):
     assert [p.name[:6] for p in parts] == [".part-"]
     assert list(parts[0].rglob("dog/c/0/*/0"))  # it had been writing
     with pytest.raises(InputError, match="no store of keystab here"):
-        stores.open_scale_space(tmp_path)
+        scale_space_store.open_scale_space(tmp_path)
 
 
 def flip(path, position):
@@ -157,17 +162,17 @@ def flip(path, position):
 @pytest.mark.parametrize("position", [0, 12345, -1, -30])  # values, values, shard index twice
 def test_flipped_bit_raises(store, position):
     flip(store / "data.zarr" / "dog" / "c" / "0" / "1" / "0", position)
-    space = stores.open_scale_space(store)
+    space = scale_space_store.open_scale_space(store)
     with pytest.raises(ValueError, match=r".+"):
         space["dog"][:, 32:64].to_numpy()
     with pytest.raises(InputError, match=r"damaged data in the rows of tiles 1 to 1") as raised:
-        stores.StoredScaleSpace(store).window(rows=slice(32, 64))
+        scale_space_store.StoredScaleSpace(store).window(rows=slice(32, 64))
     assert "\n" not in str(raised.value)
     np.testing.assert_array_equal(space["dog"][:, 64:].to_numpy(), WHOLE[:, 64:])
 
 
 def test_a_chunk_that_goes_while_the_store_is_open_raises(store):
-    opened = stores.StoredScaleSpace(store)
+    opened = scale_space_store.StoredScaleSpace(store)
     (store / "data.zarr" / "dog" / "c" / "0" / "1" / "0").unlink()
     with pytest.raises(InputError, match=r"tiles 1 to 1 \(parts of it are gone\); delete"):
         opened.window(rows=slice(32, 64))
@@ -177,12 +182,16 @@ def test_a_chunk_that_goes_while_the_store_is_open_raises(store):
 def test_flipped_bit_in_a_coordinate_raises(store):
     flip(store / "data.zarr" / "sigma" / "c" / "0", 3)
     with pytest.raises(ValueError, match="checksum"):
-        stores.open_scale_space(store)["sigma"].to_numpy()
+        scale_space_store.open_scale_space(store)["sigma"].to_numpy()
 
 
 def test_missing_chunk_is_found_on_opening(store):
     (store / "data.zarr" / "dog" / "c" / "0" / "2" / "0").unlink()
-    for opening in (stores.open_scale_space, stores.StoredScaleSpace, stores.attributes_of):
+    for opening in (
+        scale_space_store.open_scale_space,
+        scale_space_store.StoredScaleSpace,
+        scale_space_store.attributes_of,
+    ):
         with pytest.raises(InputError, match=r"dog/c/0/2/0 is missing; delete the store"):
             opening(store)
 
@@ -191,14 +200,14 @@ def test_missing_chunk_is_found_on_opening(store):
 def test_missing_array_is_found_on_opening(store, name):
     shutil.rmtree(store / "data.zarr" / name)
     with pytest.raises(InputError, match=rf"{name} is missing; delete the store"):
-        stores.open_scale_space(store)
+        scale_space_store.open_scale_space(store)
 
 
 def test_cut_chunk_is_found_on_opening(store):
     chunk = store / "data.zarr" / "dog" / "c" / "0" / "0" / "0"
     os.truncate(chunk, chunk.stat().st_size - 1)
     with pytest.raises(InputError, match=r"dog/c/0/0/0 has \d+ bytes, not \d+"):
-        stores.open_scale_space(store)
+        scale_space_store.open_scale_space(store)
 
 
 def test_writer_checks_that_every_chunk_is_there(tmp_path, monkeypatch):
@@ -216,7 +225,7 @@ def test_writer_checks_that_every_chunk_is_there(tmp_path, monkeypatch):
 
     monkeypatch.setattr(zarr.Group, "create_array", skipping)
     with pytest.raises(InputError, match="is missing"):
-        stores.write_scale_space(Zeros(), tmp_path, tile=32)
+        scale_space_store.write_scale_space(Zeros(), tmp_path, tile=32)
     assert os.listdir(tmp_path) == []
 
 
@@ -226,8 +235,8 @@ def test_constant_scale_space_is_written_in_full(tmp_path, values):
         def window(self, slices, rows, columns):
             return np.full_like(super().window(slices, rows, columns), values)
 
-    stores.write_scale_space(Constant(), tmp_path, tile=32)
-    dog = stores.open_scale_space(tmp_path)["dog"].to_numpy()
+    scale_space_store.write_scale_space(Constant(), tmp_path, tile=32)
+    dog = scale_space_store.open_scale_space(tmp_path)["dog"].to_numpy()
     np.testing.assert_array_equal(dog, np.full(Space.shape, values))
 
 
@@ -235,21 +244,21 @@ def test_what_is_no_store_gets_one_line(store, tmp_path):
     (tmp_path / "file").write_text("x")
     for path in (tmp_path / "gone", tmp_path / "file", tmp_path):
         with pytest.raises(InputError, match="no store of keystab here"):
-            stores.open_scale_space(path)
+            scale_space_store.open_scale_space(path)
     with pytest.raises(InputError, match="a store of scale-space, not of views"):
-        stores.open_views(store)
+        scale_space_store.open_views(store)
     description = store / "data.zarr" / "zarr.json"
     for text in ("{", json.dumps({"zarr_format": 3}), "[]"):
         description.write_text(text)
         with pytest.raises(InputError, match="not a readable store|something else") as raised:
-            stores.open_scale_space(store)
+            scale_space_store.open_scale_space(store)
         assert "\n" not in str(raised.value)
 
 
 def test_too_little_memory_is_said_beforehand(tmp_path, monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: 1000)
     with pytest.raises(InputError, match="of memory"):
-        stores.write_scale_space(Space(), tmp_path)
+        scale_space_store.write_scale_space(Space(), tmp_path)
     assert os.listdir(tmp_path) == []
 
 
@@ -262,12 +271,12 @@ IMAGES = [np.random.default_rng(k).random(spec.shape) for k, spec in enumerate(S
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_views_round_trip(tmp_path, dtype):
-    stores.write_views(iter(IMAGES), SPECS, tmp_path, {"set": "examples"}, dtype=dtype)
-    views = stores.open_views(tmp_path)
+    scale_space_store.write_views(iter(IMAGES), SPECS, tmp_path, {"set": "examples"}, dtype=dtype)
+    views = scale_space_store.open_views(tmp_path)
     assert views["image"].dims == ("view", "y", "x") and views["image"].dtype == dtype
     assert views["image"].shape == (2, 5, 8) and views.attrs["set"] == "examples"
     for k, image in enumerate(IMAGES):
-        read = stores.view(views, k)
+        read = scale_space_store.view(views, k)
         assert read.dtype == np.float64
         np.testing.assert_array_equal(read, image.astype(dtype))
     assert np.isnan(views["image"][1, 4:]).all() and np.isnan(views["image"][1, :, 6:]).all()
@@ -285,25 +294,25 @@ def test_views_round_trip(tmp_path, dtype):
 
 def test_views_are_checked(tmp_path):
     with pytest.raises(InputError, match="empty"):
-        stores.write_views([], [], tmp_path)
+        scale_space_store.write_views([], [], tmp_path)
     with pytest.raises(InputError, match="float16"):
-        stores.write_views(IMAGES, SPECS, tmp_path, dtype="float16")
+        scale_space_store.write_views(IMAGES, SPECS, tmp_path, dtype="float16")
     with pytest.raises(InputError, match=r"view 0 has the shape \(4, 6\), not \(5, 8\)"):
-        stores.write_views(IMAGES[::-1], SPECS, tmp_path)
+        scale_space_store.write_views(IMAGES[::-1], SPECS, tmp_path)
     with pytest.raises(ValueError, match="argument"):
-        stores.write_views(IMAGES[:1], SPECS, tmp_path)
+        scale_space_store.write_views(IMAGES[:1], SPECS, tmp_path)
     assert os.listdir(tmp_path) == []
 
 
 def test_damaged_and_missing_views_are_found(tmp_path):
-    stores.write_views(IMAGES, SPECS, tmp_path)
-    views = stores.open_views(tmp_path)
+    scale_space_store.write_views(IMAGES, SPECS, tmp_path)
+    views = scale_space_store.open_views(tmp_path)
     chunk = tmp_path / "data.zarr" / "image" / "c" / "1" / "0" / "0"
     flip(chunk, 7)
     with pytest.raises(InputError, match="view 1 is damaged"):
-        stores.view(views, 1)
+        scale_space_store.view(views, 1)
     with pytest.raises(InputError, match="there is no view 2; the set has views 0 to 1"):
-        stores.view(views, 2)
+        scale_space_store.view(views, 2)
     chunk.unlink()
     with pytest.raises(InputError, match="image/c/1/0/0 is missing"):
-        stores.open_views(tmp_path)
+        scale_space_store.open_views(tmp_path)

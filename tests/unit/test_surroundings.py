@@ -6,12 +6,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from keystab.detection import extrema_table
-from keystab.dog_space import scale_space
-from keystab.extrema import discrete_extrema
-from keystab.jets import DogSeries
-from keystab.predictors import PREDICTORS, model_inputs, predictor_table
-from keystab.surroundings import WINDOW, annulus, degeneracy, persistence, saddle_distance
+from keystab.detection.detector import extrema_table
+from keystab.detection.extrema import discrete_extrema
+from keystab.prediction.local_structure import (
+    WINDOW,
+    annulus,
+    degeneracy,
+    persistence,
+    saddle_distance,
+)
+from keystab.prediction.predictors import PREDICTORS, model_inputs, predictor_table
+from keystab.scalespace.continuous_dog import DogSeries
+from keystab.scalespace.dog import scale_space
 
 KAPPA = 2 ** (1 / 3)
 BLUR = 1.1

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from keystab.errors import InputError
-from keystab.tables import read_table, to_csv, write_table
+from keystab.io.tables import read_table, to_csv, write_table
 
 TABLE = pd.DataFrame(
     {
@@ -81,7 +81,7 @@ def test_failed_write_leaves_the_old_table(tmp_path, monkeypatch):
     path = tmp_path / "t.csv"
     write_table(TABLE, path)
     before = path.read_bytes()
-    monkeypatch.setattr("keystab.tables.to_csv", lambda table: 1 / 0)
+    monkeypatch.setattr("keystab.io.tables.to_csv", lambda table: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_table(TABLE[:1], path)
     assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]

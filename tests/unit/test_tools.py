@@ -4,13 +4,41 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+TOOLS = Path(__file__).parents[2] / "tools"
+
 
 @pytest.mark.parametrize("name", ["interrupted", "overheads", "rule_graph", "study"])
 def test_examples_of_tools(name, monkeypatch):
-    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "tools")
+    monkeypatch.syspath_prepend(TOOLS)
     failed, tried = doctest.testmod(importlib.import_module(name))
     assert tried and not failed
+
+
+@pytest.mark.parametrize("room", ["", "near/", "far/away/"])
+def test_loops_that_the_set_up_compiled_are_found_beside_their_module(room, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(TOOLS)
+    package, loops = tmp_path / "toy", tmp_path / "loops"
+    (package / room).mkdir(parents=True)
+    (package / room / "fast.py").write_text(
+        "import sys\nfrom numba import njit\n\n@njit(cache=True)\ndef twice(x):\n    return x + x\n\n"
+        "twice(2)\nsys.exit(0 if twice.stats.cache_hits else 'compiled')\n"
+    )
+    command = [sys.executable, "-B", "-m", f"toy/{room}fast".replace("/", ".")]
+    variables = {name: os.environ[name] for name in os.environ if name != "NUMBA_CACHE_DIR"}
+
+    def said(**more: str) -> str:
+        run = subprocess.run(
+            command, cwd=tmp_path, env=variables | more, capture_output=True, text=True
+        )
+        return run.stderr.strip()
+
+    assert said(NUMBA_CACHE_DIR=str(loops)) == "compiled"
+    importlib.import_module("compile_loops").copy_beside_modules(loops, package)
+    assert said() == ""

@@ -8,15 +8,15 @@ import pytest
 from scenes import blob, blobs
 from scipy.spatial import cKDTree
 
-from keystab import cosine
-from keystab.camera import Scene, simulate
-from keystab.curves import critical_balance, crossings, slice_extrema
-from keystab.detection import detect_keypoints
+from keystab.camera.simulation import Scene, simulate
+from keystab.camera.views import ViewSpec, to_reference, to_view
+from keystab.detection.detector import detect_keypoints
 from keystab.errors import InputError
-from keystab.jets import DogSeries
-from keystab.scene_truth import scene_extrema
-from keystab.truth import true_extrema
-from keystab.views import ViewSpec, to_reference, to_view
+from keystab.scalespace import cosine_series
+from keystab.scalespace.continuous_dog import DogSeries
+from keystab.truth.curves import critical_balance, crossings, slice_extrema
+from keystab.truth.scene_extrema import scene_extrema
+from keystab.truth.true_extrema import true_extrema
 
 KAPPA = 2 ** (1 / 3)
 
@@ -39,7 +39,7 @@ def test_jets_are_the_sums_and_their_differences(blur):
     rng = np.random.default_rng(2)
     sigma, y, x = rng.uniform(1.2, 3, 9), rng.uniform(-3, 24, 9), rng.uniform(-3, 37, 9)
     jets = series.jets(sigma, y, x)
-    coefs = cosine.coefficients(image)
+    coefs = cosine_series.coefficients(image)
     for i in range(9):
         upper, lower = (math.sqrt((r * sigma[i]) ** 2 - blur**2) for r in (KAPPA, 1.0))
         for order, factor, found in (
@@ -50,8 +50,8 @@ def test_jets_are_the_sums_and_their_differences(blur):
             ((1, 1), sigma[i] ** 2, jets.hessian[i, 1, 2]),
             ((0, 2), sigma[i] ** 2, jets.hessian[i, 2, 2]),
         ):
-            w = cosine.evaluate_at(coefs, y[i], x[i], upper, order)
-            w = w - cosine.evaluate_at(coefs, y[i], x[i], lower, order)
+            w = cosine_series.evaluate_at(coefs, y[i], x[i], upper, order)
+            w = w - cosine_series.evaluate_at(coefs, y[i], x[i], lower, order)
             assert abs(factor * w - found) < 1e-13
     # Along scale: central differences, which err by the square of the step.
     h = 1e-4
@@ -234,7 +234,7 @@ def test_wrong_input_gets_one_line(change, words):
 
 @pytest.mark.parametrize("seed", [3, 5, 7])
 def test_following_the_extrema_of_slices_finds_the_same(seed):
-    # Shares the sums with true_extrema, but no seed: see keystab.curves.
+    # Shares the sums with true_extrema, but no seed: see keystab.truth.curves.
     image = blobs((44, 52), seed)
     height, width = image.shape
     found = crossings(DogSeries.of_image(image, 1.1, KAPPA), 1.1, 2.2)

@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 from keystab.errors import InputError
+from keystab.evaluation.recall_precision import CAUSES
 from keystab.figures import refinement, style, truth
 from keystab.figures._render import save
-from keystab.judgement import CAUSES
 
 BOTH = ("discrete", "refined")
 

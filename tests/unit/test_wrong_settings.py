@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from keystab import feasibility, settings
 from keystab.errors import InputError
+from keystab.study import feasibility, settings
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())

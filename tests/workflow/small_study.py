@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from keystab.workflow import Study
+from keystab.provenance.study_folder import Study
 
 SCHEMA = """
 type: object
@@ -77,7 +77,7 @@ import sys
 from pathlib import Path
 
 def views(store, seal, blur, scene):
-    from keystab.seals import write_seal
+    from keystab.io.checksums import write_seal
     Path(store).mkdir(parents=True)
     Path(store, "a").write_text("n_spo,found\\n")
     Path(store, "b").write_text(f"3,{blur}\\n" + Path(scene).read_text())
@@ -86,7 +86,7 @@ def views(store, seal, blur, scene):
 def fig1(pdf, png, code, lock, table):
     from PIL import Image, PngImagePlugin
     from pypdf import PdfWriter
-    from keystab.passports import PNG_KEY, Passport, digests_of
+    from keystab.io.figure_metadata import PNG_KEY, Passport, digests_of
     passport = Passport("fig1", "0", code, lock, {"draft": "False"}, digests_of([Path(table)]))
     writer = PdfWriter()
     writer.add_blank_page(9, 9)

@@ -14,10 +14,11 @@ import pytest
 import small_study
 from project import QUICK, forked
 
-from keystab import archive, cli, provenance, recomputation, verification
+from keystab.cli import main as cli
 from keystab.errors import InputError
-from keystab.fingerprint import fingerprint
-from keystab.workflow import Study
+from keystab.provenance import archive, lineage, recomputation, verification
+from keystab.provenance.code_digest import fingerprint
+from keystab.provenance.study_folder import Study
 
 CODE = fingerprint("keystab.figures.fig1")
 
@@ -25,7 +26,7 @@ CODE = fingerprint("keystab.figures.fig1")
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
     """Run Snakemake in forks of this process, which spares its import every time."""
-    monkeypatch.setattr("keystab.workflow.subprocess", SimpleNamespace(run=forked))
+    monkeypatch.setattr("keystab.provenance.study_folder.subprocess", SimpleNamespace(run=forked))
 
 
 @pytest.fixture(scope="module")
@@ -354,16 +355,14 @@ def test_whence_follows_a_figure_to_the_scene_and_says_what_changed(here, monkey
 
 
 def test_whence_names_the_command_with_its_settings(here):
-    assert (
-        list(provenance._commands("figures/fig1.pdf", here.project))[0] == "make figures/fig1.pdf"
-    )
+    assert list(lineage._commands("figures/fig1.pdf", here.project))[0] == "make figures/fig1.pdf"
     (here.project / "config/what_if").mkdir()
     (here.project / "config/what_if/sharp.yaml").write_text("figures: figures/sharp\n")
     (here.project / "config/broken.yaml").write_text("{")
-    make, snakemake = provenance._commands("figures/sharp/fig1.pdf", here.project)
+    make, snakemake = lineage._commands("figures/sharp/fig1.pdf", here.project)
     assert make == "make figures/sharp/fig1.pdf WITH=config/what_if/sharp.yaml"
     assert snakemake.endswith("figures/sharp/fig1.pdf -j2 --configfile config/what_if/sharp.yaml")
-    make, _ = provenance._commands("figures/lost/fig1.pdf", here.project)
+    make, _ = lineage._commands("figures/lost/fig1.pdf", here.project)
     assert make == "make figures/lost/fig1.pdf WITH=the settings whose figures go to figures/lost"
 
 

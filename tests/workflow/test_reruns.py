@@ -58,17 +58,17 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
 @pytest.mark.parametrize(
     ("name", "old", "new", "expected"),
     [
-        ("src/keystab/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
-        ("src/keystab/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
-        ("src/keystab/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS | {"detect_blobs"}),
-        ("src/keystab/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "judge_keypoints", "truth"} | PREDICTING),
+        ("src/keystab/detection/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
+        ("src/keystab/detection/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
+        ("src/keystab/detection/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS | {"detect_blobs"}),
+        ("src/keystab/evaluation/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "judge_keypoints", "truth"} | PREDICTING),
         ("src/keystab/stages/cut_cubes.py", "    args = ", "    MORE = 1\n    args = ", {"cut_cubes", "fig6"}),
-        ("src/keystab/settings.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", set()),
+        ("src/keystab/study/settings.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", set()),
         ("src/keystab/figures/palette.py", '"condition": "#A8458A"', '"condition": "#A8458B"', {"fig5"}),
         ("src/keystab/figures/palette.py", '"""Predictors of stability', '"""Features', set()),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
-        ("src/keystab/camera.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", SIMULATION),
+        ("src/keystab/camera/simulation.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", SIMULATION),
         ("workflow/report/fig3.rst", "", "A better caption. ", set()),
         ("workflow/rules/detect.smk", "rule detect:\n", "# a comment\nrule detect:\n", set()),
         ("config/config.yaml", "detector:\n", "# a comment\ndetector:\n", set()),
@@ -90,7 +90,7 @@ def test_edits_of_code(finished, name, old, new, expected):
     ("name", "old", "new"),
     [
         ("config/claims.yaml", "criterion: new > 0", "criterion: new >= 0"),
-        ("src/keystab/claims.py", "\nVERDICTS = ", "\nMORE = 1\nVERDICTS = "),
+        ("src/keystab/study/claims.py", "\nVERDICTS = ", "\nMORE = 1\nVERDICTS = "),
     ],
 )
 def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old, new):

@@ -123,7 +123,9 @@ def test_why_says_what_changed_and_what_follows(finished):
     assert lines[1] == "Because refinement.max_offset was 0.6 and is 0.7:"
     assert "  Matching the keypoints of SIFT as shipped (2 s)" in lines[2:4]
     assert lines[4:] == ["After these:", "  Drawing figures/quick/fig7.pdf (7 s)"]
-    finished.edit("src/keystab/roc.py", "import annotations", "import annotations\nMORE = 1")
+    finished.edit(
+        "src/keystab/evaluation/roc.py", "import annotations", "import annotations\nMORE = 1"
+    )
     _, said = finished.dry_run("--configfile", "config/quick.yaml", "--", "figures/quick/fig5.pdf")
     lines = list(WHY["in_lines"](WHY["jobs_and_reasons"](said), TOOL["Clock"]([], {})))
     assert lines[1] == "Because code of keystab.stages.score_features changed:"

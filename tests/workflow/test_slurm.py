@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from project import QUICK, ROOT, Project, copy_of_project
 
-from keystab import seals
+from keystab.io import checksums
 
 ONE_NODE = ROOT / "tests/slurm/one_node.sh"
 STORE = "results/quick/scale_space/n3"
@@ -111,4 +111,4 @@ def test_jobs_through_slurm(slurm, tmp_path):
     assert files(project) == files(local)
     # The seals are equal; each holds for the chunks of its own store.
     for one in (project, local):
-        seals.verify(one.folder / STORE, one.folder / SEAL)
+        checksums.verify(one.folder / STORE, one.folder / SEAL)

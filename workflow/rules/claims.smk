@@ -6,7 +6,7 @@ numbers of every claim from the tables; ask its criterion; write the verdicts; p
 pictures side by side.
 """
 
-from keystab.claims import read_claims, table_names
+from keystab.study.claims import read_claims, table_names
 
 try:
     CLAIMS = read_claims(Path(workflow.basedir, "config/claims.yaml"))

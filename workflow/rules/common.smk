@@ -18,9 +18,10 @@ from pathlib import Path
 
 import yaml
 
-from keystab import feasibility, ledgers, settings, view_sets
-from keystab import fingerprint as fingerprints
+from keystab.camera import view_sets
 from keystab.errors import InputError
+from keystab.provenance import code_digest
+from keystab.study import claims_by_scene, feasibility, settings
 
 try:
     config.update(
@@ -59,7 +60,7 @@ KEPT_SETS = SEARCHED_SETS if config["keep_scale_spaces"] is True else []
 STREAMED_SETS = [name for name in SEARCHED_SETS if name not in KEPT_SETS]
 
 # Compiled loops are kept with the other things that can be made again, and shared by all jobs.
-os.environ.setdefault("NUMBA_CACHE_DIR", str(fingerprints.folder_of_loops(Path.cwd())))
+os.environ.setdefault("NUMBA_CACHE_DIR", str(code_digest.folder_of_loops(Path.cwd())))
 
 # Jobs use the Python that runs Snakemake, also where its environment was not activated.
 os.environ.update(PATH=os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()]))
@@ -111,7 +112,7 @@ def fixed(name, value):
 
 def fingerprint(module):
     """Parameter that changes with the code of a module and of all that it imports."""
-    return fixed(f"code of {module}", fingerprints.fingerprint(module))
+    return fixed(f"code of {module}", code_digest.fingerprint(module))
 
 
 # Snakemake does not see a change of installed packages; a parameter that changes with the lock
@@ -168,10 +169,10 @@ def sources_of_pictures():
     Each picture has settings of its own, and so a run of its own: no rule here can make the others.
     """
     try:
-        found = ledgers.sources("config/config.yaml", config["pictures"])
+        found = claims_by_scene.sources("config/config.yaml", config["pictures"])
     except InputError as problem:
         sys.exit(str(problem))
-    problems = ledgers.missing(found, made=f"{RESULTS}/claims.csv")
+    problems = claims_by_scene.missing(found, made=f"{RESULTS}/claims.csv")
     if problems:
         sys.exit("\n".join(problems))
     return found

@@ -8,7 +8,7 @@ Nothing here changes a result or makes anything run again.
 Every job has one thread: matrix products differ in their last digits between numbers of threads.
 """
 
-from keystab.pictures import picture_shape
+from keystab.io.pictures import picture_shape
 
 REFERENCE_SHAPE = picture_shape(config["reference"])
 # Of a search, per pixel and scale per octave: three times what views with the most noise took.

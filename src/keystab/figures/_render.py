@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from keystab import __version__
 from keystab.errors import InputError
 from keystab.figures import style
-from keystab.files import written_whole
-from keystab.passports import PNG_KEY, Passport, digests_of
+from keystab.utils.files import written_whole
+from keystab.io.figure_metadata import PNG_KEY, Passport, digests_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +51,7 @@ def read_tables(folder: Path | str, needs: Needs) -> dict[str, DataFrame]:
     InputError
         If a table is missing, has no rows or lacks a column.
     """
-    from keystab.tables import read_table
+    from keystab.io.tables import read_table
 
     tables = {}
     for name, columns in needs.items():

@@ -46,7 +46,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     Parameters
     ----------
     tables : mapping
-        ``figS4``: the table of `keystab.blob_tables.blob_table`.
+        ``figS4``: the table of `keystab.experiments.blob_scales.blob_table`.
     draft : bool
         Say on the figure that its numbers come from quick settings.
 

@@ -11,15 +11,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.comparison import comparable
+from keystab.camera.view_sets import common_scales
+from keystab.camera.views import ViewSpec, effective_blur
 from keystab.errors import InputError
-from keystab.judgement import judged, with_positions
-from keystab.seals import verify
-from keystab.stores import StoredViews
-from keystab.tables import read_table
-from keystab.view_sets import common_scales
-from keystab.view_tables import CommonRange
-from keystab.views import ViewSpec, effective_blur
+from keystab.evaluation.recall_precision import judged, with_positions
+from keystab.experiments.view_stability import CommonRange
+from keystab.io.checksums import verify
+from keystab.io.scale_space_store import StoredViews
+from keystab.io.tables import read_table
+from keystab.matching.common_range import comparable
 
 
 class View(NamedTuple):
@@ -130,7 +130,7 @@ def comparable_only(
     args: argparse.Namespace,
     scale_column: str = "step_sigma",
 ) -> pd.DataFrame:
-    """Select the detections that `keystab.comparison.comparable` says are compared."""
+    """Select the detections that `keystab.matching.common_range.comparable` says are compared."""
     return detections[compared(args, shape)(detections, scale_column)]
 
 
@@ -174,7 +174,7 @@ def tolerances(args: argparse.Namespace) -> dict[str, float]:
 
 
 def same_options(args: argparse.Namespace) -> dict[str, Any]:
-    """Collect the options of `keystab.duplicates.same`."""
+    """Collect the options of `keystab.matching.correspondence.same`."""
     return {**tolerances(args), "match_sign": args.match_sign}
 
 
@@ -184,7 +184,7 @@ def positions_of_matches(matches: pd.DataFrame, extrema: pd.DataFrame) -> NDArra
     Parameters
     ----------
     matches : DataFrame
-        ``keypoint, n_spo, row``, from `keystab.sampling_tables.long_matches`.
+        ``keypoint, n_spo, row``, from `keystab.experiments.sampling_stability.long_matches`.
     extrema : DataFrame
         From `read_extrema`, of the same samplings in the same order.
 

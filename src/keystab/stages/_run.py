@@ -152,7 +152,7 @@ def blob_arguments(to: argparse.ArgumentParser) -> None:
 
 
 def blobs_and_ways(args: argparse.Namespace) -> dict[str, Any]:
-    """Return what `keystab.blob_tables` asks of blobs and of the ways to detect them."""
+    """Return the blobs, and the ways to detect them, of `keystab.experiments.blob_scales`."""
     import numpy as np
 
     # Rounded, so that the numbers can be read.

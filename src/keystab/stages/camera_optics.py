@@ -24,8 +24,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "profiles", "table of profiles to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.optics import optics_table, profile_table
-    from keystab.tables import write_table
+    from keystab.camera.optics import optics_table, profile_table
+    from keystab.io.tables import write_table
 
     lens = (args.wavelength, args.fill_factor, args.defocus, args.spherical)
     write_table(optics_table(args.f_numbers, args.pixel_pitches, *lens), args.table)

@@ -18,9 +18,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "markdown", "Markdown to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.files import written_whole
-    from keystab.ledgers import read_ledger, side_by_side, to_markdown
-    from keystab.tables import write_table
+    from keystab.io.tables import write_table
+    from keystab.study.claims_by_scene import read_ledger, side_by_side, to_markdown
+    from keystab.utils.files import written_whole
 
     ledgers = {name: read_ledger(path) for name, path in zip(args.names, args.ledgers, strict=True)}
     table = side_by_side(ledgers)

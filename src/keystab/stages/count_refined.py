@@ -25,10 +25,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.refinement import accepted, positions
-    from keystab.sampling import Sampling, balanced_delta
+    from keystab.detection.refinement import accepted, positions
+    from keystab.io.tables import read_table, write_table
+    from keystab.scalespace.sampling import Sampling, balanced_delta
     from keystab.stages._inputs import comparable_only, read_view
-    from keystab.tables import read_table, write_table
 
     view = read_view(args.views, args.views_digest)
     octave = argparse.Namespace(**(vars(args) | {"last_scale": 2.0}))

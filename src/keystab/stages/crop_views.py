@@ -23,8 +23,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     import numpy as np
     import pandas as pd
 
+    from keystab.io.tables import write_table
     from keystab.stages._inputs import read_view
-    from keystab.tables import write_table
 
     parts = []
     for value, store, digest in zip(args.values, args.views, args.views_digest, strict=True):

@@ -23,9 +23,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "cubes", "table of samples to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.cubes import cubes_around, dense_scale_space, drawn
+    from keystab.experiments.local_volumes import cubes_around, dense_scale_space, drawn
+    from keystab.io.tables import write_table
     from keystab.stages._inputs import read_keypoints, read_view
-    from keystab.tables import write_table
 
     columns = ["keypoint", "y", "x", "sigma", "sign", "stability"]
     keypoints = read_keypoints(args.keypoints, columns)

@@ -20,9 +20,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     import numpy as np
     import pandas as pd
 
-    from keystab.seals import verify
-    from keystab.stores import open_views, view
-    from keystab.tables import write_table
+    from keystab.io.checksums import verify
+    from keystab.io.scale_space_store import open_views, view
+    from keystab.io.tables import write_table
 
     verify(args.views, args.views_digest)
     views = open_views(args.views)

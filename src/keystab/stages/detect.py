@@ -25,15 +25,15 @@ def main(argv: Sequence[str] | None = None) -> None:
     args = parser.parse_args(argv)
     _run.require_both_or_neither(parser, args)
 
-    from keystab.detection import extrema_table
-    from keystab.dog_space import scale_space
-    from keystab.extrema import discrete_extrema
-    from keystab.refinement import trace
-    from keystab.seals import verify
+    from keystab.detection.detector import extrema_table
+    from keystab.detection.extrema import discrete_extrema
+    from keystab.detection.refinement import trace
+    from keystab.detection.stored_extrema import stored_extrema
+    from keystab.io.checksums import verify
+    from keystab.io.scale_space_store import StoredScaleSpace
+    from keystab.io.tables import write_table
+    from keystab.scalespace.dog import scale_space
     from keystab.stages._inputs import read_view
-    from keystab.stored_extrema import stored_extrema
-    from keystab.stores import StoredScaleSpace
-    from keystab.tables import write_table
 
     view = read_view(args.views, args.views_digest)
     space = scale_space(

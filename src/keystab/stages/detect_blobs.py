@@ -17,8 +17,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "traces", "table of refinement traces to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.blob_tables import detect_blobs
-    from keystab.tables import write_table
+    from keystab.experiments.blob_scales import detect_blobs
+    from keystab.io.tables import write_table
 
     extrema, traces = detect_blobs(**_run.blobs_and_ways(args))
     write_table(extrema, args.extrema)

@@ -27,10 +27,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.progress import progress
+    from keystab.detection.view_detector import Detector, detect_in_view
+    from keystab.io.tables import write_table
     from keystab.stages._inputs import read_view
-    from keystab.tables import write_table
-    from keystab.view_detection import Detector, detect_in_view
+    from keystab.utils.progress import progress
 
     view = read_view(args.views, args.views_digest)
     extrema, traces, first = [], [], 0

@@ -21,12 +21,12 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.detection import extrema_table
-    from keystab.dog_space import scale_space
-    from keystab.extrema import extrema_and_cubes
-    from keystab.progress import progress
+    from keystab.detection.detector import extrema_table
+    from keystab.detection.extrema import extrema_and_cubes
+    from keystab.io.tables import write_table
+    from keystab.scalespace.dog import scale_space
     from keystab.stages._inputs import read_view
-    from keystab.tables import write_table
+    from keystab.utils.progress import progress
 
     view = read_view(args.views, args.views_digest)
     tables = []

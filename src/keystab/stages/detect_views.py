@@ -27,12 +27,12 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.progress import progress
-    from keystab.seals import verify
+    from keystab.detection.view_detector import detect_in_view
+    from keystab.io.checksums import verify
+    from keystab.io.tables import write_table
     from keystab.stages._inputs import read_views
     from keystab.stages._scale_spaces import search_of_stores, searched_windows, view_detector
-    from keystab.tables import write_table
-    from keystab.view_detection import detect_in_view
+    from keystab.utils.progress import progress
 
     views = read_views(args.views, args.views_digest)
     if args.store is not None:

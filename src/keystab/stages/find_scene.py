@@ -20,10 +20,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.pictures import read_picture
-    from keystab.scene_truth import scene_extrema
+    from keystab.io.pictures import read_picture
+    from keystab.io.tables import write_table
     from keystab.stages._inputs import read_views
-    from keystab.tables import write_table
+    from keystab.truth.scene_extrema import scene_extrema
 
     spec = read_views(args.views, args.views_digest).specs[0]
     extrema = scene_extrema(

@@ -18,9 +18,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
 
+    from keystab.io.tables import write_table
     from keystab.stages._inputs import read_view
-    from keystab.tables import write_table
-    from keystab.truth import true_extrema
+    from keystab.truth.true_extrema import true_extrema
 
     view = read_view(args.views, args.views_digest)
     extrema = true_extrema(view.image, view.blur, args.sigma_min, args.sigma_max, args.kappa)

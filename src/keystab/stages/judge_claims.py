@@ -19,8 +19,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "markdown", "Markdown to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.claims import judge_all, read_claims, table_names, tally, write_ledger
-    from keystab.tables import read_table
+    from keystab.io.tables import read_table
+    from keystab.study.claims import judge_all, read_claims, table_names, tally, write_ledger
 
     claims = read_claims(args.claims)
     tables = {name: read_table(args.tables / f"{name}.csv") for name in table_names(claims)}

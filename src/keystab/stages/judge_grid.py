@@ -22,8 +22,8 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
+    from keystab.io.tables import read_table, write_table
     from keystab.stages._inputs import judged_in_octave, read_view
-    from keystab.tables import read_table, write_table
 
     view, truth = read_view(args.views, args.views_digest), read_table(args.truth)
     rows = [

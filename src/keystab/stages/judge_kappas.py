@@ -26,9 +26,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     import numpy as np
     import pandas as pd
 
-    from keystab.refinement import refined_keypoints
+    from keystab.detection.refinement import refined_keypoints
+    from keystab.io.tables import read_table, write_table
     from keystab.stages._inputs import judged_in_octave, read_view
-    from keystab.tables import read_table, write_table
 
     view, extrema = read_view(args.views, args.views_digest), read_table(args.extrema)
     refined = refined_keypoints(

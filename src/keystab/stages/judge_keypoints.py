@@ -26,13 +26,13 @@ def main(argv: Sequence[str] | None = None) -> None:
     import numpy as np
     import pandas as pd
 
-    from keystab.features import DIRECTIONS
-    from keystab.intervals import wilson_interval
-    from keystab.judgement import CAUSES, causes
-    from keystab.roc import auc_table
-    from keystab.stability import label
+    from keystab.evaluation.intervals import wilson_interval
+    from keystab.evaluation.recall_precision import CAUSES, causes
+    from keystab.evaluation.roc import auc_table
+    from keystab.evaluation.stability import label
+    from keystab.io.tables import read_table, write_table
+    from keystab.prediction.features import DIRECTIONS
     from keystab.stages._inputs import read_keypoints, tolerances
-    from keystab.tables import read_table, write_table
 
     keypoints = read_keypoints(args.keypoints, ["keypoint", "y", "x", "sigma", "sign", "stability"])
     low, high = (args.sigma_min * end for end in (args.first_scale, args.last_scale))

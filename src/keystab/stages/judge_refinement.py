@@ -25,11 +25,11 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.dog_space import scale_space
-    from keystab.judgement import kept_and_lost
-    from keystab.refinement import MOST_MODELS, trace
+    from keystab.detection.refinement import MOST_MODELS, trace
+    from keystab.evaluation.recall_precision import kept_and_lost
+    from keystab.io.tables import read_table, write_table
+    from keystab.scalespace.dog import scale_space
     from keystab.stages._inputs import compared, read_view, tolerances
-    from keystab.tables import read_table, write_table
 
     view, truth = read_view(args.views, args.views_digest), read_table(args.truth)
     iterations = [*range(1, args.most_iterations + 1), MOST_MODELS]

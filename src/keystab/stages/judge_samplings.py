@@ -25,10 +25,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.refinement import refined_table
-    from keystab.sampling import Sampling, balanced_delta
+    from keystab.detection.refinement import refined_table
+    from keystab.io.tables import read_table, write_table
+    from keystab.scalespace.sampling import Sampling, balanced_delta
     from keystab.stages._inputs import judged_in_octave, read_view
-    from keystab.tables import read_table, write_table
 
     view, truth = read_view(args.views, args.views_digest), read_table(args.truth)
     rows = []

@@ -33,11 +33,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     import numpy as np
     import pandas as pd
 
-    from keystab.judgement import mean_over_views
-    from keystab.refinement import refined_keypoints
+    from keystab.detection.refinement import refined_keypoints
+    from keystab.evaluation.recall_precision import mean_over_views
+    from keystab.experiments.view_stability import CommonRange
+    from keystab.io.tables import read_table, write_table
     from keystab.stages._inputs import read_views, tolerances
-    from keystab.tables import read_table, write_table
-    from keystab.view_tables import CommonRange
 
     seen_from = read_views(args.views, args.views_digest).specs[0]
     scene = read_table(args.truth)

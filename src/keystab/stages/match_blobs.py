@@ -19,8 +19,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.blob_tables import blob_table
-    from keystab.tables import read_table, write_table
+    from keystab.experiments.blob_scales import blob_table
+    from keystab.io.tables import read_table, write_table
 
     table = blob_table(
         **_run.blobs_and_ways(args),

@@ -24,11 +24,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.blur_tables import blur_error_table
+    from keystab.detection.refinement import refined_keypoints
     from keystab.errors import InputError
-    from keystab.refinement import refined_keypoints
+    from keystab.experiments.blur_errors import blur_error_table
+    from keystab.io.tables import read_table, write_table
     from keystab.stages._inputs import common_range, read_views, same_options
-    from keystab.tables import read_table, write_table
 
     views = read_views(args.views, args.views_digest)
     blurs = [spec.blur for spec in views.specs]

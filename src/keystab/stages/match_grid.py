@@ -28,10 +28,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.sampling import Sampling, balanced_delta
-    from keystab.sampling_tables import sampling_counts
+    from keystab.experiments.sampling_stability import sampling_counts
+    from keystab.io.tables import write_table
+    from keystab.scalespace.sampling import Sampling, balanced_delta
     from keystab.stages._inputs import comparable_only, read_extrema, read_view, same_options
-    from keystab.tables import write_table
 
     view = read_view(args.views, args.views_digest)
     grid, balanced = read_extrema(args.grid), read_extrema(args.samplings)

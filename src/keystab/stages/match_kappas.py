@@ -26,10 +26,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "occurrence", "occurrence matrix to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.kappa_tables import kappa_tables
-    from keystab.refinement import refined_keypoints
+    from keystab.detection.refinement import refined_keypoints
+    from keystab.experiments.kappa_stability import kappa_tables
+    from keystab.io.tables import read_table, write_table
     from keystab.stages._inputs import read_view, same_options
-    from keystab.tables import read_table, write_table
 
     view = read_view(args.views, args.views_digest)
     keypoints = refined_keypoints(

@@ -26,10 +26,15 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "summary", "table of a few numbers to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.sampling import balanced_delta
-    from keystab.sampling_tables import change_counts, long_matches, match_samplings, summary
+    from keystab.experiments.sampling_stability import (
+        change_counts,
+        long_matches,
+        match_samplings,
+        summary,
+    )
+    from keystab.io.tables import write_table
+    from keystab.scalespace.sampling import balanced_delta
     from keystab.stages._inputs import comparable_only, read_extrema, read_view, same_options
-    from keystab.tables import write_table
 
     view = read_view(args.views, args.views_digest)
     extrema = read_extrema(args.samplings)

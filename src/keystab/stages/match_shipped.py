@@ -27,11 +27,11 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.refinement import refined_keypoints
-    from keystab.shipped import passes_filters
+    from keystab.detection.refinement import refined_keypoints
+    from keystab.detection.sift_filters import passes_filters
+    from keystab.experiments.view_stability import count_table, curve_table, match_views
+    from keystab.io.tables import read_table, write_table
     from keystab.stages._inputs import common_range, read_views, same_options
-    from keystab.tables import read_table, write_table
-    from keystab.view_tables import count_table, curve_table, match_views
 
     views = read_views(args.views, args.views_digest)
     everywhere, same = common_range(views, args), same_options(args)

@@ -33,10 +33,15 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.refinement import MOST_MODELS, refined_keypoints
+    from keystab.detection.refinement import MOST_MODELS, refined_keypoints
+    from keystab.experiments.view_stability import (
+        count_table,
+        curve_table,
+        match_views,
+        precision_table,
+    )
+    from keystab.io.tables import read_table, write_table
     from keystab.stages._inputs import common_range, read_views, same_options
-    from keystab.tables import read_table, write_table
-    from keystab.view_tables import count_table, curve_table, match_views, precision_table
 
     views = read_views(args.views, args.views_digest)
     everywhere, same = common_range(views, args), same_options(args)

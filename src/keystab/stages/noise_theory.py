@@ -21,8 +21,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     import numpy as np
     import pandas as pd
 
-    from keystab.noise import dog_noise
-    from keystab.tables import write_table
+    from keystab.io.tables import write_table
+    from keystab.scalespace.white_noise import dog_noise
 
     sigma = args.sigma_min * 2.0 ** np.linspace(0, args.n_oct, 20 * args.n_oct + 1)
     here, above = (dog_noise(scale, args.camera_blur, args.kappa) for scale in (sigma, 2 * sigma))

@@ -19,10 +19,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "digest", "seal of the store to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.dog_space import scale_space
-    from keystab.seals import write_seal
+    from keystab.io.checksums import write_seal
+    from keystab.io.scale_space_store import write_scale_space
+    from keystab.scalespace.dog import scale_space
     from keystab.stages._inputs import read_view
-    from keystab.stores import write_scale_space
 
     view = read_view(args.views, args.views_digest)
     space = scale_space(

@@ -18,10 +18,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "digest", "seal of the stores to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.seals import write_seal
+    from keystab.io.checksums import write_seal
+    from keystab.io.scale_space_store import write_scale_space
     from keystab.stages._inputs import read_views
     from keystab.stages._scale_spaces import store_of, view_detector
-    from keystab.stores import write_scale_space
 
     views = read_views(args.views, args.views_digest)
     for number, view in enumerate(views):

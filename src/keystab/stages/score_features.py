@@ -23,9 +23,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "auc", "table of areas under the curves to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.predictor_tables import score_features
+    from keystab.experiments.feature_scores import score_features
+    from keystab.io.tables import read_table, write_table
     from keystab.stages._inputs import positions_of_matches, read_extrema, read_keypoints
-    from keystab.tables import read_table, write_table
 
     keypoints = read_keypoints(args.keypoints, ["keypoint", "stability"])
     extrema = read_extrema(args.samplings)

@@ -32,9 +32,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "roc", "table of ROC curves to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.jets import DogSeries
-    from keystab.prediction_tables import described, score_predictors
-    from keystab.progress import progress
+    from keystab.experiments.predictor_scores import described, score_predictors
+    from keystab.io.tables import read_table, write_table
+    from keystab.scalespace.continuous_dog import DogSeries
     from keystab.stages._inputs import (
         compared,
         read_extrema,
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         read_view,
         same_options,
     )
-    from keystab.tables import read_table, write_table
+    from keystab.utils.progress import progress
 
     ends = (args.sigma_min * args.first_scale, args.sigma_min * args.end)
     columns = ["keypoint", "y", "x", "sigma", "sign", "stability"]

@@ -33,12 +33,12 @@ def main(argv: Sequence[str] | None = None) -> None:
     required(parser, "digest", "seal of the store to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.camera import Scene, simulate
+    from keystab.camera.simulation import Scene, simulate
+    from keystab.camera.view_sets import view_specs
     from keystab.errors import InputError
-    from keystab.pictures import read_with_digest
-    from keystab.seals import write_seal
-    from keystab.stores import write_views
-    from keystab.view_sets import view_specs
+    from keystab.io.checksums import write_seal
+    from keystab.io.pictures import read_with_digest
+    from keystab.io.scale_space_store import write_views
 
     picture, digest = read_with_digest(args.reference)
     if args.reference_sha256 not in (None, digest):

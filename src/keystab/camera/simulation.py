@@ -1,0 +1,279 @@
+"""The simulated camera (section 4 of the paper).
+
+A reference picture stands for the scene. A camera of blur c that sees S reference pixels per pixel
+of its own takes the view obtained by blurring the reference by c S and sampling it every S
+reference pixels. Both are done on the cosine series of the reference, so that any blur, sub-pixel
+shift and non-integer zoom is exact; only rotations by other than quarter turns interpolate.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import operator
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from keystab.camera.views import ViewSpec, effective_blur, to_reference, to_view
+from keystab.errors import InputError
+from keystab.scalespace import cosine_series
+from keystab.utils import memory
+
+__all__ = [
+    "Scene",
+    "ViewSpec",
+    "effective_blur",
+    "random_generator",
+    "simulate",
+    "simulate_view",
+    "to_reference",
+    "to_view",
+]
+
+#: Samples of the auxiliary grid of a rotated view per standard deviation of the blur, and the
+#: least number of them per reference pixel, which matters where there is little or no blur.
+_SAMPLES_PER_BLUR = 6.0
+_SAMPLES_PER_PIXEL = 8.0
+
+#: Samples of the auxiliary grid that are held at a time; larger views are taken in pieces.
+_MOST_SAMPLES = 2**24
+
+
+class Scene:
+    """A reference picture, prepared for any number of views.
+
+    Parameters
+    ----------
+    reference : array_like, shape (H, W)
+        Grey values of the reference picture.
+
+    Attributes
+    ----------
+    coefficients : ndarray of float64, shape (H, W)
+        Its cosine series (`keystab.scalespace.cosine_series.coefficients`), computed once.
+
+    Raises
+    ------
+    InputError
+        If `reference` is no image of finite real values; a path is none, see
+        `keystab.io.pictures.read_picture`.
+
+    Examples
+    --------
+    >>> Scene(np.eye(4)).shape
+    (4, 4)
+    """
+
+    def __init__(self, reference: ArrayLike) -> None:
+        self.coefficients = cosine_series.coefficients(_grey_values(reference))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the reference in pixels."""
+        height, width = self.coefficients.shape
+        return height, width
+
+
+def simulate_view(
+    reference: Scene | ArrayLike,
+    blur: float,
+    step: float,
+    shape: tuple[int, int],
+    shift: tuple[float, float] = (0.0, 0.0),
+    rotation: float = 0.0,
+    noise: float = 0.0,
+    seed: int | str | tuple[int | str, ...] | None = None,
+) -> NDArray[np.float64]:
+    """Take one view of a reference picture with the simulated camera of section 4.
+
+    The reference is blurred by c S and evaluated where the view's pixels look: pixel (i, j) looks
+    at centre_ref + S R(rotation) ((i, j) - centre_view + shift), where the centre of n pixels is
+    (n - 1)/2. The view is thus centred on the reference, and shift and rotation move the camera
+    about that centre. Beyond its border the reference continues as its mirror image.
+
+    Blur, shift, zoom and rotations by multiples of a right angle are exact but for rounding: two
+    small matrix products with the cosine series of the reference. Other rotations interpolate a
+    finely sampled auxiliary grid by quintic B-splines. Measured against direct summation at 3000
+    random pixels of views of a 4000x2250 photograph in [0, 1], the error was at most 2.3e-9 for
+    c S from 0.9 to 11 reference pixels, a tenth of the rounding to float32; for white noise in
+    [0, 1] seen without any blur, 5e-8.
+
+    Parameters
+    ----------
+    reference : Scene or array_like, shape (H, W)
+        The scene. A `Scene` saves computing the series for every view.
+    blur, step, shape, shift, rotation, noise, seed
+        See `ViewSpec`.
+
+    Returns
+    -------
+    ndarray of float64, shape `shape`
+        The view. Not clipped: noise, and the ringing of a reference with sharp edges seen with
+        little blur, may leave [0, 1].
+
+    Raises
+    ------
+    InputError
+        If an argument is out of its range, or the view does not fit into memory.
+
+    Notes
+    -----
+    A reference that itself has a blur of c_ref pixels gives a view of blur `effective_blur`.
+    Aliasing is part of the simulation: blurs below about 0.8 do not suppress the frequencies that
+    sampling folds back.
+
+    Examples
+    --------
+    >>> ramp = np.tile(np.arange(8.0), (4, 1))
+    >>> simulate_view(ramp, blur=0.0, step=2.0, shape=(1, 3), shift=(0.0, 0.25)).round(3)
+    array([[2., 4., 6.]])
+    """
+    return simulate(reference, ViewSpec(blur, step, shape, shift, rotation, noise, seed))
+
+
+def simulate(reference: Scene | ArrayLike, spec: ViewSpec) -> NDArray[np.float64]:
+    """Take the view that a `ViewSpec` describes; see `simulate_view`.
+
+    Parameters
+    ----------
+    reference : Scene or array_like, shape (H, W)
+        The scene.
+    spec : ViewSpec
+        The view.
+
+    Returns
+    -------
+    ndarray of float64, shape `spec.shape`
+
+    Raises
+    ------
+    InputError
+        If `reference` is no image, or the view does not fit into memory.
+
+    Examples
+    --------
+    >>> simulate(np.ones((6, 6)), ViewSpec(blur=1.0, step=3.0, shape=(2, 2))).round(12)
+    array([[1., 1.],
+           [1., 1.]])
+    """
+    scene = reference if isinstance(reference, Scene) else Scene(reference)
+    _check_memory(scene, spec)
+    i, j = (np.arange(n, dtype=np.float64) for n in spec.shape)
+    blur = spec.blur * spec.step
+    quarter_turns = spec.rotation / (math.pi / 2)
+    if quarter_turns != round(quarter_turns):
+        y, x = to_reference(spec, scene.shape, i[:, None], j[None, :])
+        view = _interpolate(scene.coefficients, y, x, blur)
+    elif round(quarter_turns) % 2 == 0:  # rows of the view run along rows of the reference
+        y, _ = to_reference(spec, scene.shape, i, 0.0)
+        _, x = to_reference(spec, scene.shape, 0.0, j)
+        view = cosine_series.evaluate(scene.coefficients, y, x, blur)
+    else:  # rows of the view run along columns of the reference
+        y, _ = to_reference(spec, scene.shape, 0.0, j)
+        _, x = to_reference(spec, scene.shape, i, 0.0)
+        view = cosine_series.evaluate(scene.coefficients, y, x, blur).T
+    if spec.noise > 0:
+        seed = spec.seed if isinstance(spec.seed, tuple) else (spec.seed,)
+        draw = random_generator("camera noise", *seed)
+        view = view + spec.noise * draw.standard_normal(spec.shape)
+    return np.ascontiguousarray(view)
+
+
+def random_generator(*purpose: int | str) -> np.random.Generator:
+    """Random numbers that depend on what they are for, and on nothing else.
+
+    The generator (Philox) is keyed by SHA-256 of the purpose, so that results depend neither on the
+    order in which draws are made nor on how work is split into jobs.
+
+    Parameters
+    ----------
+    *purpose : int or str
+        Anything that names the draw: the study's seed, the set, the view. 1 and "1" differ.
+
+    Returns
+    -------
+    numpy.random.Generator
+
+    Raises
+    ------
+    TypeError
+        If a part is neither an integer nor a string. Floats are refused: a last digit that
+        differs would change everything.
+
+    Examples
+    --------
+    >>> random_generator("noise", 3).random() == random_generator("noise", 3).random()
+    True
+    >>> random_generator("noise", 3).random() == random_generator("noise", 4).random()
+    False
+    """
+    parts = [part if isinstance(part, str) else operator.index(part) for part in purpose]
+    digest = hashlib.sha256(json.dumps(parts).encode()).digest()
+    return np.random.Generator(np.random.Philox(key=int.from_bytes(digest[:16], "big")))
+
+
+def _grey_values(reference: ArrayLike) -> NDArray[Any]:
+    """Return an array of real numbers."""
+    if isinstance(reference, (str, bytes, os.PathLike)):
+        raise InputError(
+            f"the reference is {reference!r}; give the array that read_picture returns"
+        )
+    try:
+        values = np.asarray(reference)
+    except ValueError:  # rows of different lengths
+        raise InputError("the reference is no array; give one of shape (height, width)") from None
+    if values.dtype.kind not in "biuf":
+        raise InputError(f"the reference holds {values.dtype} values; give real numbers")
+    return values
+
+
+def _interpolate(
+    coefs: NDArray[np.float64], y: NDArray[np.float64], x: NDArray[np.float64], blur: float
+) -> NDArray[np.float64]:
+    """Blurred series at the points of a rotated lattice, by quintic B-splines.
+
+    The series is evaluated on an upright auxiliary grid that covers the points. Its frequencies
+    are first divided by those of the B-spline, sinc^6, so that the spline reproduces each of them
+    without a prefilter; what remains is the alias of each frequency f (in cycles per grid sample),
+    about (f / (1 - f))^6.
+    """
+    from scipy import ndimage
+
+    spacing = max(blur / _SAMPLES_PER_BLUR, 1.0 / _SAMPLES_PER_PIXEL)
+    corners = [(float(p.min()) - 4 * spacing, float(p.max()) + 4 * spacing) for p in (y, x)]
+    n_rows, n_columns = (int((stop - start) / spacing) + 2 for start, stop in corners)
+    counts = [cosine_series.significant(n, blur) for n in coefs.shape]
+    if n_rows * n_columns > y.size * counts[0]:  # few points far apart: the plain sum is cheaper
+        return cosine_series.evaluate_at(coefs, y, x, blur)
+    if n_rows * n_columns > _MOST_SAMPLES:
+        axis = int(np.argmax(y.shape))
+        half = y.shape[axis] // 2
+        pieces = zip(np.split(y, [half], axis), np.split(x, [half], axis), strict=True)
+        return np.concatenate([_interpolate(coefs, *piece, blur) for piece in pieces], axis)
+    weighted = coefs[: counts[0], : counts[1]].copy()
+    for axis, (n, count) in enumerate(zip(coefs.shape, counts, strict=True)):
+        factors = np.sinc(np.arange(count) * spacing / (2 * n)) ** -6  # cycles per grid sample
+        weighted *= np.expand_dims(cosine_series.gaussian(n, blur)[:count] * factors, 1 - axis)
+    (top, _), (left, _) = corners
+    rows = cosine_series.basis(top + spacing * np.arange(n_rows), coefs.shape[0], counts[0])
+    columns = cosine_series.basis(left + spacing * np.arange(n_columns), coefs.shape[1], counts[1])
+    grid = rows @ weighted @ columns.T
+    where = np.stack([(y - top) / spacing, (x - left) / spacing])
+    return ndimage.map_coordinates(grid, where, order=5, prefilter=False)
+
+
+def _check_memory(scene: Scene, spec: ViewSpec) -> None:
+    blur = spec.blur * spec.step
+    rows, columns = (cosine_series.significant(n, blur) for n in scene.shape)
+    height, width = spec.shape
+    bases = 3 * (height * rows + width * columns)
+    products = 3 * height * width + min(height * columns, width * rows)
+    memory.require(
+        8.0 * (bases + products),
+        f"a view of {height} x {width} pixels",
+        "ask for a smaller shape",
+    )

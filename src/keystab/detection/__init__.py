@@ -1,0 +1,1 @@
+"""Extrema of the sampled scale-space: the search, its refinement, and the whole detector."""

@@ -1,0 +1,1 @@
+"""Statistics of keypoints, whatever detected them: stability, recall, precision, ROC curves."""

@@ -1,0 +1,232 @@
+"""What detections at different samplings have in common, as tables (sections 5.1 and 5.2).
+
+Detections are discrete extrema of `keystab.detection.detector.extrema_table` with the columns
+``n_spo`` and ``delta_min`` that say at which sampling each was found, reduced to the comparable
+ones (`keystab.matching.common_range`) where that is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from keystab.evaluation.intervals import wilson_interval
+from keystab.evaluation.stability import new_and_lost
+from keystab.matching.unique_keypoints import matches, unique_keypoints
+from keystab.prediction.features import condition_numbers, hessians
+
+Same = Mapping[str, Any]
+"""What `keystab.matching.correspondence.same` takes besides two tables, by name."""
+
+
+def sampling_counts(extrema: pd.DataFrame, common: pd.DataFrame, same: Same) -> dict[str, Any]:
+    """Numbers of extrema of one sampling, and the condition of their Hessians (figure 3).
+
+    Parameters
+    ----------
+    extrema : DataFrame
+        All discrete extrema of the sampling.
+    common : DataFrame
+        The comparable ones.
+    same : mapping
+        Options of `keystab.matching.correspondence.same`.
+
+    Returns
+    -------
+    dict
+        ``n_extrema``, ``n_common``, ``n_unique``, ``gap`` (0: the unique set is proven minimal) and
+        the quartiles ``median_condition``, ``q25_condition``, ``q75_condition`` of the condition
+        number of the Hessian per grid step over all extrema; NaN where there are none.
+    """
+    unique = unique_keypoints(common, **same, set_column=None)
+    condition = condition_numbers(hessians(extrema))
+    quartiles = np.quantile(condition, [0.5, 0.25, 0.75]) if len(condition) else [np.nan] * 3
+    return {
+        "n_extrema": len(extrema),
+        "n_common": len(common),
+        "n_unique": len(unique),
+        "gap": unique.attrs["gap"],
+        **dict(zip(("median_condition", "q25_condition", "q75_condition"), quartiles, strict=True)),
+    }
+
+
+def change_counts(
+    extrema: pd.DataFrame, common: pd.DataFrame, steps: Mapping[int, float], same: Same
+) -> pd.DataFrame:
+    """Numbers of extrema, and rates of new and lost ones, per sampling (figure 4 a, b).
+
+    Parameters
+    ----------
+    extrema, common : DataFrame
+        All discrete extrema of all samplings, and the comparable ones.
+    steps : mapping from n_spo to delta_min
+        The samplings, from coarse to fine.
+    same : mapping
+        Options of `keystab.matching.correspondence.same`.
+
+    Returns
+    -------
+    DataFrame
+        ``n_spo, delta_min, n_extrema, n_common`` and the columns of
+        `keystab.evaluation.stability.new_and_lost`, which refer to ``n_common``.
+    """
+    counts = new_and_lost(common, **same, set_column="n_spo", sets=list(steps))
+    counts = counts.rename(columns={"n_detections": "n_common"})
+    counts.insert(1, "delta_min", list(steps.values()))
+    found = extrema["n_spo"].value_counts()
+    counts.insert(2, "n_extrema", [int(found.get(n_spo, 0)) for n_spo in steps])
+    return counts
+
+
+def floor_summary(counts: pd.DataFrame, stability: pd.Series, settles_at: int) -> pd.DataFrame:
+    """Rates of new and lost extrema where they have settled, in one row (figure floor).
+
+    Parameters
+    ----------
+    counts : DataFrame
+        From `change_counts`.
+    stability : Series
+        Share of the samplings in which each unique keypoint is detected.
+    settles_at : int
+        Rates are those of the samplings with at least this `n_spo`, weighted by their detections.
+
+    Returns
+    -------
+    DataFrame
+        ``mean_common`` (compared detections per sampling), ``new_rate, new_low, new_high``,
+        ``lost_rate, lost_low, lost_high`` (shares with 95 % Wilson intervals), ``n_unique``,
+        ``share_always`` with ``low_always, high_always``; NaN where nothing is detected.
+    """
+    settled = counts[counts["n_spo"] >= settles_at]
+    row: dict[str, float] = {"mean_common": settled["n_common"].mean()}
+    for name in ("new", "lost"):
+        known = settled[settled[f"n_{name}"].notna()]
+        k, n = int(known[f"n_{name}"].sum()), int(known["n_common"].sum())
+        low, high = wilson_interval(k, n)
+        row |= {f"{name}_rate": k / n if n else np.nan}
+        row |= {f"{name}_low": float(low), f"{name}_high": float(high)}
+    always = int((stability == 1).sum())
+    low, high = wilson_interval(always, len(stability))
+    row |= {"n_unique": len(stability), "share_always": always / max(len(stability), 1)}
+    row |= {"low_always": float(low), "high_always": float(high)}
+    return pd.DataFrame([row])
+
+
+class Matched(NamedTuple):
+    """Unique keypoints of many samplings, and which detection each is.
+
+    Attributes
+    ----------
+    keypoints : DataFrame
+        ``keypoint, y, x, sigma, sign, n_samplings, stability``.
+    found : ndarray of int, shape (n_keypoints, n_samplings)
+        Row positions in the table of comparable detections, -1 where there is none.
+    gap : int
+        0: proven to be a minimum set.
+    """
+
+    keypoints: pd.DataFrame
+    found: NDArray[np.intp]
+    gap: int
+
+
+def match_samplings(
+    common: pd.DataFrame, samplings: Sequence[int], same: Same, reverse_order: bool = False
+) -> Matched:
+    """Find the unique keypoints of all samplings, and each in every sampling (section 5.2).
+
+    Parameters
+    ----------
+    common : DataFrame
+        Comparable detections of all samplings.
+    samplings : sequence of int
+        Values of n_spo.
+    same : mapping
+        Options of `keystab.matching.correspondence.same`.
+    reverse_order : bool
+        Choose among minimum sets the other way round, see
+        `keystab.matching.unique_keypoints.unique_keypoints`.
+    """
+    unique = unique_keypoints(common, **same, set_column="n_spo", reverse_order=reverse_order)
+    found = matches(unique, common, **same, set_column="n_spo", sets=samplings)
+    keypoints = unique[["y", "x", "sigma", "sign"]].reset_index(drop=True)
+    keypoints.insert(0, "keypoint", np.arange(len(unique)))
+    keypoints["n_samplings"] = (found >= 0).sum(axis=1)
+    keypoints["stability"] = keypoints["n_samplings"] / len(samplings)
+    return Matched(keypoints, found, int(unique.attrs["gap"]))
+
+
+def long_matches(
+    matched: Matched, samplings: Sequence[int], rows: NDArray[np.intp]
+) -> pd.DataFrame:
+    """Which detection of each sampling is which keypoint, one row per pair of them.
+
+    Parameters
+    ----------
+    matched : Matched
+        From `match_samplings`.
+    samplings : sequence of int
+        Values of n_spo.
+    rows : ndarray of int
+        For each comparable detection, its row in the table of all extrema of its sampling.
+
+    Returns
+    -------
+    DataFrame
+        ``keypoint, n_spo, row``; ``row`` is -1 where the keypoint is not detected.
+    """
+    n_keypoints, n_samplings = matched.found.shape
+    return pd.DataFrame(
+        {
+            "keypoint": np.repeat(np.arange(n_keypoints), n_samplings),
+            "n_spo": np.tile(np.asarray(samplings, dtype=np.int64), n_keypoints),
+            "row": np.append(rows, -1)[matched.found].ravel(),
+        }
+    )
+
+
+def summary(
+    matched: Matched, reverse: Matched, stable_above: float, unstable_below: float
+) -> pd.DataFrame:
+    """What figure 4 says in a few numbers, and how much of it the choice of a unique set decides.
+
+    Parameters
+    ----------
+    matched, reverse : Matched
+        The unique set, and the one chosen the other way round.
+    stable_above, unstable_below : float
+        Limits of stability.
+
+    Returns
+    -------
+    DataFrame
+        ``quantity, value, note``.
+    """
+
+    def shares(stability: pd.Series) -> dict[str, float]:
+        return {
+            "share_always": float((stability == 1).mean()),
+            "share_stable": float((stability > stable_above).mean()),
+            "share_unstable": float((stability < unstable_below).mean()),
+        }
+
+    notes = {
+        "share_always": "detected at every sampling",
+        "share_stable": f"detected at more than {100 * stable_above:g} % of the samplings",
+        "share_unstable": f"detected at less than {100 * unstable_below:g} % of the samplings",
+    }
+    here, other = (shares(each.keypoints["stability"]) for each in (matched, reverse))
+    rows: list[tuple[str, float, str]] = [
+        ("n_unique", len(matched.keypoints), "unique keypoints"),
+        ("gap", matched.gap, "0: proven to be the smallest number possible"),
+        *((name, here[name], notes[name]) for name in notes),
+        *(
+            (f"{name}_change", other[name] - here[name], "with the reversed choice of unique set")
+            for name in notes
+        ),
+    ]
+    return pd.DataFrame(rows, columns=["quantity", "value", "note"])

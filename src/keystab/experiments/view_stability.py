@@ -1,0 +1,265 @@
+"""What detections of many views of one scene have in common, as tables (section 5.5 and 6).
+
+Detections are tables with the columns ``view``, ``y, x, sigma`` in pixels of their view, and
+``step_sigma`` where they are discrete. They are brought to the frame of the first view, kept where
+all views could have seen them, and matched there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from keystab.camera.view_sets import in_common_field, to_common_frame
+from keystab.camera.views import ViewSpec
+from keystab.evaluation.intervals import Purpose, normal_half_width, wilson_interval
+from keystab.evaluation.localization import mean_precision
+from keystab.evaluation.stability import stability_curve
+from keystab.matching.unique_keypoints import matches, unique_keypoints
+
+Labels = Mapping[str, Any]
+"""What a table is about: columns of one value each, put before its own."""
+
+
+@dataclass(frozen=True)
+class CommonRange:
+    """What all views of a set could have seen.
+
+    Attributes
+    ----------
+    specs : sequence of ViewSpec
+        The views; the first one gives the common frame.
+    reference_shape : tuple of int
+        Height and width of the reference in pixels.
+    margin : float
+        Width of the margin of every view, in its pixels.
+    low, high : float
+        Scales, in pixels of the first view.
+    """
+
+    specs: Sequence[ViewSpec]
+    reference_shape: tuple[int, int]
+    margin: float
+    low: float
+    high: float = np.inf
+
+    def common(self, detections: pd.DataFrame, scale_column: str = "sigma") -> pd.DataFrame:
+        """Detections of the common field and range of scales, in the frame of the first view.
+
+        Parameters
+        ----------
+        detections : DataFrame
+            Columns ``view, y, x, sigma`` and `scale_column`.
+        scale_column : str
+            The scale that decides. For discrete extrema it is ``step_sigma``, the scale after one
+            unbounded quadratic step; see `keystab.matching.common_range.comparable`.
+
+        Returns
+        -------
+        DataFrame
+            Some rows of `detections`, with ``y, x, sigma`` and `scale_column` in the common frame.
+        """
+        table = detections.reset_index(drop=True)
+        view = table["view"].to_numpy()
+        y, x = table["y"].to_numpy(float, copy=True), table["x"].to_numpy(float, copy=True)
+        zoom = np.ones(len(table))
+        for number, spec in enumerate(self.specs):
+            here = view == number
+            y[here], x[here] = to_common_frame(
+                spec, self.specs[0], self.reference_shape, y[here], x[here]
+            )
+            zoom[here] = spec.step / self.specs[0].step
+        table = table.assign(y=y, x=x, sigma=table["sigma"] * zoom)
+        if scale_column != "sigma":
+            table[scale_column] = table[scale_column] * zoom
+        scale = table[scale_column]
+        keep = (scale >= self.low) & (scale <= self.high)
+        keep &= in_common_field(self.specs, self.reference_shape, self.margin, y, x)
+        return table[keep].reset_index(drop=True)
+
+
+class MatchedViews(NamedTuple):
+    """Unique keypoints of a set of views, and which detection each is.
+
+    Attributes
+    ----------
+    common : DataFrame
+        The detections that were compared.
+    found : ndarray of int, shape (n_unique, n_views)
+        Row positions in `common`, -1 where a keypoint is not detected.
+    gap : int
+        0: the unique set is proven to be a minimum set.
+    """
+
+    common: pd.DataFrame
+    found: NDArray[np.intp]
+    gap: int
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Occurrence matrix."""
+        return self.found >= 0
+
+
+def match_views(common: pd.DataFrame, n_views: int, same: Mapping[str, Any]) -> MatchedViews:
+    """Find the unique keypoints of a set of views, and each in every view.
+
+    Parameters
+    ----------
+    common : DataFrame
+        From `CommonRange.common`.
+    n_views : int
+        Views of the set, whether or not anything is detected in them.
+    same : mapping
+        Options of `keystab.matching.correspondence.same`.
+    """
+    unique = unique_keypoints(common, **same, set_column="view")
+    found = matches(unique, common, **same, set_column="view", sets=range(n_views))
+    return MatchedViews(common, found, int(unique.attrs["gap"]))
+
+
+def labelled(table: pd.DataFrame, labels: Labels) -> pd.DataFrame:
+    """Put columns of one value each before those of a table."""
+    return pd.concat(
+        [pd.DataFrame({name: [value] * len(table) for name, value in labels.items()}), table],
+        axis=1,
+    )
+
+
+def curve_table(matched: MatchedViews, labels: Labels, n_resamples: int) -> pd.DataFrame:
+    """Percentage of unique keypoints seen in at least p % of the views (figures 7 to 12).
+
+    Returns
+    -------
+    DataFrame
+        `labels` and the columns of `keystab.evaluation.stability.stability_curve`; bands by
+        resampling keypoints and views at once, with the unique set and the matches held fixed.
+    """
+    curve = stability_curve(matched.seen, n_resamples=n_resamples, purpose=purpose_of(labels))
+    return labelled(curve, labels)
+
+
+def precision_table(
+    matched: MatchedViews, labels: Labels, minimum_share: float, n_resamples: int
+) -> pd.DataFrame:
+    """Mean precision of the keypoints seen often enough (figures 7 c, 8 b).
+
+    Returns
+    -------
+    DataFrame
+        `labels`, ``quantity`` (location in pixels of the first view, log2_sigma in octaves) and the
+        columns of `keystab.evaluation.localization.mean_precision`.
+    """
+    table = mean_precision(
+        matched.common, matched.found, minimum_share, n_resamples, purpose_of(labels)
+    )
+    return labelled(table.reset_index(), labels)
+
+
+def count_table(matched: MatchedViews, labels: Labels) -> pd.DataFrame:
+    """One row of numbers: how many detections and keypoints, and how many are seen in all views.
+
+    Returns
+    -------
+    DataFrame
+        `labels`; ``n_views``; mean number of compared detections per view ``mean_detections``
+        with the ends ``low_detections, high_detections`` of its 95 % interval over views
+        (1.96 standard errors); ``n_unique``, ``gap``, ``n_always``; ``share_always`` with its
+        95 % Wilson interval ``low_always, high_always``.
+    """
+    n_unique, n_views = matched.found.shape
+    per_view = np.bincount(matched.common["view"].to_numpy(np.int64), minlength=n_views)
+    error = normal_half_width(per_view)
+    always = int(matched.seen.all(axis=1).sum())
+    low, high = wilson_interval(always, n_unique)
+    row = {
+        "n_views": n_views,
+        "mean_detections": per_view.mean(),
+        "low_detections": per_view.mean() - error,
+        "high_detections": per_view.mean() + error,
+        "n_unique": n_unique,
+        "gap": matched.gap,
+        "n_always": always,
+        "share_always": always / n_unique if n_unique else np.nan,
+        "low_always": float(low),
+        "high_always": float(high),
+    }
+    return labelled(pd.DataFrame([row]), labels)
+
+
+def scale_table(
+    detections: pd.DataFrame,
+    everywhere: CommonRange,
+    starts: Sequence[float],
+    same: Mapping[str, Any],
+    seen_by: float,
+    labels: Labels,
+    n_resamples: int,
+) -> pd.DataFrame:
+    """Stability of one octave's keypoints against where it starts (figures 11 b, 12 c, d).
+
+    Parameters
+    ----------
+    detections : DataFrame
+        Refined keypoints of all views.
+    everywhere : CommonRange
+        Its field of view is used; its scales are replaced.
+    starts : sequence of float
+        First scales of the octaves, in pixels of the first view.
+    same : mapping
+        Options of `keystab.matching.correspondence.same`.
+    seen_by : float
+        Share of the views in which a keypoint must be seen.
+    labels : mapping
+        Columns to put before the others.
+    n_resamples : int
+        Of the bootstrap over keypoints and views.
+
+    Returns
+    -------
+    DataFrame
+        One row per start: `labels`; ``sigma_from``; ``n_unique``, of the octave; ``n_seen`` of
+        them, in at least ``seen_by`` of the views; ``percentage_seen`` with ``low, high``;
+        ``mean_above``, keypoints per view at scales of at least ``sigma_from`` and without upper
+        end, with ``low_above, high_above`` (1.96 standard errors over views).
+    """
+    rows = []
+    n_views = len(everywhere.specs)
+    for start in starts:
+        field = (everywhere.specs, everywhere.reference_shape, everywhere.margin)
+        octave = CommonRange(*field, start, 2 * start)
+        matched = match_views(octave.common(detections), n_views, same)
+        curve = stability_curve(
+            matched.seen,
+            [100 * seen_by],
+            n_resamples,
+            (*purpose_of(labels), f"{start:.6g}"),
+        ).iloc[0]
+        above = CommonRange(*field, start).common(detections)
+        per_view = np.bincount(above["view"].to_numpy(np.int64), minlength=n_views)
+        error = normal_half_width(per_view)
+        rows.append(
+            {
+                "sigma_from": start,
+                "n_unique": len(matched.found),
+                "seen_by": seen_by,
+                "n_seen": int(curve["n_unique"]),
+                "percentage_seen": curve["percentage_of_unique"],
+                "low": curve["low"],
+                "high": curve["high"],
+                "mean_above": per_view.mean(),
+                "low_above": per_view.mean() - error,
+                "high_above": per_view.mean() + error,
+            }
+        )
+    return labelled(pd.DataFrame(rows), labels)
+
+
+def purpose_of(labels: Labels) -> Purpose:
+    """What random draws are for, from the labels of a table."""
+    return tuple(f"{name}={value}" for name, value in labels.items())

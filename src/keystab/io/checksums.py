@@ -1,0 +1,105 @@
+"""Seals: digests of all files of a folder, to find what was damaged, lost or added."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+from keystab.errors import InputError
+from keystab.utils.files import written_whole
+
+__all__ = ["seal", "verify", "write_seal"]
+
+
+def seal(path: str | os.PathLike[str]) -> str:
+    """List the digests of all files of a folder, one line each, in the format of ``sha256sum``.
+
+    The same contents give the same text, wherever the folder lies. Hidden files do not count: they
+    belong to the workflow engine.
+
+    Parameters
+    ----------
+    path : path
+        A folder.
+
+    Returns
+    -------
+    str
+        Lines of 64 hexadecimal digits, two spaces and the file's path within the folder, in the
+        order of the paths. ``sha256sum -c`` run inside the folder checks it.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, or no file in it.
+    """
+    lines = [f"{digest}  {name}\n" for name, digest in _digests(Path(path)).items()]
+    if not lines:
+        raise InputError(f"{path}: no folder with files that could be sealed")
+    return "".join(lines)
+
+
+def write_seal(path: str | os.PathLike[str], seal_path: str | os.PathLike[str]) -> None:
+    """Write the `seal` of a folder to a file beside it.
+
+    Parameters
+    ----------
+    path : path
+        The folder.
+    seal_path : path
+        The file, by custom the folder's name with ``.sha256`` appended.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, or no file in it.
+    """
+    text = seal(path)
+    with written_whole(seal_path) as part:
+        part.write_text(text, encoding="utf-8", newline="")
+
+
+def verify(path: str | os.PathLike[str], seal_path: str | os.PathLike[str]) -> None:
+    """Check a folder against its seal.
+
+    Parameters
+    ----------
+    path : path
+        The folder.
+    seal_path : path
+        The file that `write_seal` wrote.
+
+    Raises
+    ------
+    InputError
+        If files are damaged, missing or new; the first of them is named. Also if there is no
+        seal.
+    """
+    try:
+        lines = Path(seal_path).read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError):
+        raise InputError(f"{seal_path}: no readable seal; make the store again") from None
+    sealed = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+    found = _digests(Path(path))
+    problems = [f"{name} is missing" for name in sealed if name not in found]
+    problems += [
+        f"{name} is damaged" for name in sealed if name in found and found[name] != sealed[name]
+    ]
+    problems += [f"{name} was not there when it was sealed" for name in found if name not in sealed]
+    if problems:
+        more = f", and {len(problems) - 1} more" if len(problems) > 1 else ""
+        raise InputError(f"{path}: {problems[0]}{more}; delete the store and make it again")
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file that is not hidden, by path within the folder, sorted."""
+    names = sorted(
+        file.relative_to(folder).as_posix() for file in folder.rglob("*") if file.is_file()
+    )
+    digests = {}
+    for name in names:
+        if not any(part.startswith(".") for part in name.split("/")):
+            with (folder / name).open("rb") as file:
+                digests[name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return digests

@@ -1,0 +1,1 @@
+"""What a single detection shows about its stability."""

@@ -1,0 +1,1 @@
+"""Where results come from: digests of code, records of runs, archives and their verification."""

@@ -1,0 +1,72 @@
+"""Compiled loops that no longer belong to the code, and how they are forgotten.
+
+numba keeps a compiled loop beside its module and compiles it again when that file changes, but not
+when a loop that it calls in another file does. A checkout that was updated would go on with the old
+one. The workflow and the tests keep theirs apart, see
+`keystab.provenance.code_digest.folder_of_loops`; this serves whoever imports the library from a
+folder that can be written to. Loops kept elsewhere, in NUMBA_CACHE_DIR or in numba's folder for
+packages that are only readable, are left alone, and an edit between the import and the first use is
+seen only if another one follows.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+PACKAGE_FOLDER = Path(__file__).parents[1]
+STAMP = "compiled_from.txt"
+
+
+def forget_outdated(package_folder: Path = PACKAGE_FOLDER) -> bool:
+    """Remove the compiled loops of a package if its modules are not those of the last time.
+
+    Names, sizes and times of the modules are compared with a stamp beside the loops: equal or not,
+    whatever the clock says.
+
+    Parameters
+    ----------
+    package_folder : Path
+        Folder whose modules count, in all rooms, with the compiled loops of each room in its
+        ``__pycache__``.
+
+    Returns
+    -------
+    bool
+        Whether the modules had changed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> forget_outdated(folder), forget_outdated(folder)
+    (True, False)
+    """
+    kept = package_folder / "__pycache__"
+    try:
+        stamp = "".join(sorted(_modules(package_folder, "")))
+        if (kept / STAMP).is_file() and (kept / STAMP).read_text() == stamp:
+            return False
+        # Indices first: data without one are never read, but a new index could find old data.
+        for pattern in ("**/__pycache__/*.nbi", "**/__pycache__/*.nbc"):
+            for path in package_folder.glob(pattern):
+                with contextlib.suppress(FileNotFoundError):  # another process removes them too
+                    path.unlink()
+        kept.mkdir(exist_ok=True)
+        (kept / STAMP).write_text(stamp)
+    except OSError:  # only readable: numba keeps nothing here either
+        return False
+    return True
+
+
+def _modules(folder: str | os.PathLike[str], room: str) -> Iterator[str]:
+    """Name, size and time of each module in a folder and in those below it."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                about = entry.stat()
+                yield f"{room}{entry.name} {about.st_size} {about.st_mtime_ns}\n"
+            elif entry.name != "__pycache__" and entry.is_dir():
+                yield from _modules(entry.path, f"{room}{entry.name}/")

@@ -1,0 +1,211 @@
+"""Where a figure comes from: its passport, the files behind it, and how to make it again."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import yaml
+
+from keystab.errors import InputError
+from keystab.io.figure_metadata import PNG_KEY, Passport
+from keystab.provenance.code_digest import fingerprint
+from keystab.provenance.snakemake_records import Record, read_records, settings_behind, upstream
+
+__all__ = ["code_of_figure", "file_digest", "read_passport", "whence"]
+
+_SHORT = 12
+
+
+def read_passport(path: Path | str) -> Passport:
+    """Read the passport of a figure.
+
+    Parameters
+    ----------
+    path : path
+        A PDF or PNG; what it is, its content says, not its ending.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no readable PDF or PNG, or it has no sound passport.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            start = file.read(8)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; give a figure, as PDF or PNG") from None
+    except IsADirectoryError:
+        raise InputError(f"{path} is a folder; give a figure, as PDF or PNG") from None
+    if start.startswith(b"%PDF"):
+        text = _text_of_pdf(path)
+    elif start == b"\x89PNG\r\n\x1a\n":
+        text = _text_of_png(path)
+    else:
+        raise InputError(f"{path}: neither a PDF nor a PNG; give a figure of the study")
+    if text is None:
+        raise InputError(
+            f"{path}: has no passport of keystab; was it drawn by the study, and not changed since?"
+        )
+    try:
+        return Passport.from_text(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}; draw it again") from None
+
+
+def _text_of_pdf(path: Path) -> str | None:
+    from pypdf import PdfReader
+    from pypdf.errors import PyPdfError
+
+    try:
+        about = PdfReader(path).metadata
+        found = about.get("/Keywords") if about else None
+    except (PyPdfError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise InputError(f"{path}: a damaged PDF; draw it again") from None
+    return None if found is None else str(found)
+
+
+def _text_of_png(path: Path) -> str | None:
+    from PIL import Image
+
+    try:
+        with Image.open(path) as picture:
+            picture.load()
+            found = picture.info.get(PNG_KEY)
+    except (OSError, SyntaxError, ValueError):
+        raise InputError(f"{path}: a damaged PNG; draw it again") from None
+    return found if found is None else str(found)
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def code_of_figure(figure: str) -> str | None:
+    """Fingerprint of the code that draws a figure here and now; None where it is not known here."""
+    try:
+        return fingerprint(f"keystab.figures.{figure.lower()}")
+    except ValueError:
+        return None
+
+
+def whence(path: Path | str, project: Path) -> str:
+    """Say where a figure comes from.
+
+    Parameters
+    ----------
+    path : path
+        A figure of the study, as PDF or PNG; it may lie anywhere.
+    project : path
+        Copy of the project, with or without results.
+
+    Returns
+    -------
+    str
+        What its passport says, and whether that is still so here; the files that it was made from,
+        down to the picture, with digests; the settings behind it; the commands that make it again.
+
+    Raises
+    ------
+    InputError
+        As `read_passport`.
+    """
+    path = Path(path)
+    passport = read_passport(path)
+    records = read_records(project)
+    drawn = _record_of(path, passport, records, project)
+    lines = [f"{path}: {passport.figure}, drawn by keystab {passport.version}"]
+    lines += [f"  {line}" for line in _identity(passport, project)]
+    lines += ["", "drawn from"]
+    folder = Path(drawn.inputs[0]).parent if drawn and drawn.inputs else None
+    for name, digest in sorted(passport.tables.items()):
+        table = (folder / name).as_posix() if folder else name
+        lines.append(f"  {table}  {digest}  {_state(project / table, digest)}")
+    if drawn is None:
+        lines += ["", "the records of Snakemake here know no such figure, nor what lies behind it"]
+        return "\n".join([*lines, "", "to make it again", f"  make figures/{passport.figure}.pdf"])
+    chain = upstream(records, [drawn.output])
+    behind = [record for record in chain if record is not drawn]
+    lines += ["", "which were made from, and these in turn from"]
+    lines += [f"  {line}" for line in _chain(reversed(behind), project)]
+    settings = settings_behind(behind)
+    lines += ["", f"settings behind it ({len(settings)})"]
+    lines += [f"  {name} = {value}" for name, value in settings.items()]
+    lines += ["", "drawn with", f"  {drawn.command}", "", "to make it again, with all behind it"]
+    return "\n".join([*lines, *(f"  {line}" for line in _commands(drawn.output, project))])
+
+
+def _identity(passport: Passport, project: Path) -> Iterator[str]:
+    """What the passport says about code, software and settings, and whether it is so here."""
+    here = code_of_figure(passport.figure)
+    lock = file_digest(project / "environment.lock")
+    for name, given, now in (("code", passport.code, here), ("lock", passport.lock, lock)):
+        if given is None:
+            yield f"{name:<8} not said: it was drawn by hand"
+        else:
+            yield f"{name:<8} {given}  {'as it is here' if given == now else 'not as it is here'}"
+    own = ", ".join(f"{name} = {value}" for name, value in sorted(passport.settings.items()))
+    yield f"config   {passport.config}  of its tables and of {own}"
+
+
+def _record_of(
+    path: Path, passport: Passport, records: Mapping[str, Record], project: Path
+) -> Record | None:
+    """Record of a figure: by its place in the project, or else by the digests of its tables."""
+    wanted = sorted(passport.tables.values())
+    here = path.absolute()
+    name = here.relative_to(project).as_posix() if here.is_relative_to(project) else ""
+    candidates = [records[name]] if name in records else []
+    candidates += [record for record in records.values() if record.rule == passport.figure]
+    for record in candidates:
+        if sorted(record.digests.values()) == wanted:
+            return record
+    return None
+
+
+def _chain(records: Iterable[Record], project: Path) -> Iterator[str]:
+    """Each rule, the nearest first, with the inputs that its jobs had and their digests."""
+    inputs: dict[str, dict[str, str]] = {}
+    for record in records:
+        of_rule = inputs.setdefault(record.rule, {})
+        for name in record.inputs:
+            digest = record.digests.get(name)
+            if digest is not None:
+                of_rule[name] = digest
+    for rule, digests in inputs.items():
+        yield f"{rule}" + ("" if digests else " (from settings alone)")
+        for name, digest in sorted(digests.items()):
+            yield f"  {name}  {digest[:_SHORT]}  {_state(project / name, digest)}"
+
+
+def _state(path: Path, digest: str) -> str:
+    if not path.is_file():
+        return "not here"
+    return "unchanged" if file_digest(path) == digest else "CHANGED since then"
+
+
+def _commands(output: str, project: Path) -> Iterator[str]:
+    """Commands that make a figure, with the settings whose figures go to its folder."""
+    folder = Path(output).parent.as_posix()
+    yield f"make {output}{_overlay(folder, project, ' WITH=', 'make')}"
+    overlay = _overlay(folder, project, " --configfile ", "snakemake")
+    yield f"or, after `. .venv/bin/activate`: snakemake {output} -j2{overlay}"
+
+
+def _overlay(folder: str, project: Path, flag: str, tool: str) -> str:
+    """Flag that lays the right settings over those of the project."""
+    files = sorted(project.glob("config/**/*.yaml"))
+    for file in files:
+        try:
+            given = yaml.safe_load(file.read_text(encoding="utf-8"))
+        except (OSError, yaml.YAMLError):
+            continue
+        if isinstance(given, dict) and given.get("figures") == folder:
+            name = file.relative_to(project).as_posix()
+            known = name == "config/config.yaml" or (tool == "make" and folder == "figures/quick")
+            return "" if known else f"{flag}{name}"
+    return f"{flag}the settings whose figures go to {folder}"

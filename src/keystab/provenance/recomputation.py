@@ -1,0 +1,159 @@
+"""Compute figures of a run again, and say by how much their numbers differ."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from keystab.errors import InputError
+from keystab.provenance import table_differences
+from keystab.provenance.archive import read_sums
+from keystab.provenance.lineage import file_digest
+from keystab.provenance.snakemake_records import Record, read_records
+from keystab.provenance.study_folder import Study
+from keystab.provenance.verification import (
+    Check,
+    alike,
+    compare_tables,
+    copy_workflow,
+    left_out_digests,
+    read_about,
+)
+
+__all__ = ["recompute"]
+
+
+def recompute(
+    source: Path,
+    project: Path,
+    targets: Sequence[str],
+    cores: int,
+    rtol: float = table_differences.RTOL,
+    atol: float = table_differences.ATOL,
+) -> tuple[list[Check], bool]:
+    """Compute figures again from the picture on and compare with a run.
+
+    Parameters
+    ----------
+    source : path
+        The run: an unpacked archive, or the folder of the reference.
+    project : path
+        Copy of the project whose code, settings and lock are used.
+    targets : sequence of str
+        Names of figures, such as ``fig5``; or ``all``.
+    cores : int
+        Jobs at a time.
+    rtol, atol : float, optional
+        See `compare_tables`.
+
+    Returns
+    -------
+    checks : list of Check
+        How tables, figures, verdicts and intermediate files compare.
+    sound : bool
+        Whether nothing failed.
+
+    Raises
+    ------
+    InputError
+        If a figure is none of the study, or a job fails.
+    """
+    about = read_about(source)
+    everything = list(targets) == ["all"]
+    with tempfile.TemporaryDirectory() as name:
+        scratch = Path(name)
+        copy_workflow(project, scratch)
+        if (source / "settings").is_dir():
+            shutil.copytree(source / "settings", scratch / "settings")
+        study = Study(scratch, about["overlays"])
+        drawn = [
+            f"{study.figures}/{target}.{kind}" for target in targets for kind in ("pdf", "png")
+        ]
+        known = {output.path for output in study.outputs()}
+        for path in [] if everything else drawn:
+            if path not in known:
+                figures = sorted({Path(it).stem for it in known if it.startswith(study.figures)})
+                raise InputError(f"{Path(path).stem}: no figure; give {', '.join(figures)} or all")
+        study.run(cores, *([] if everything else drawn))
+        records = read_records(scratch)
+        tables = [
+            PurePosixPath(path).name
+            for path in records
+            if path.startswith(f"{study.results}/tables/")
+        ]
+        checks = [
+            compare_tables(source, scratch / study.results, study.lock_digest, tables, rtol, atol),
+            _compare_figures(source, study, records, about),
+        ]
+        if everything:
+            checks.append(_compare_verdicts(source, scratch / study.results, about))
+        checks.append(_compare_left_out(source, study, records, about))
+    return checks, not any(check.problems for check in checks)
+
+
+def _compare_figures(
+    source: Path, study: Study, records: Mapping[str, Record], about: Mapping[str, Any]
+) -> Check:
+    """Compare drawn figures byte by byte; they carry the digests of their tables."""
+    inside = source / about["figures"]
+    inside = inside if inside.is_dir() else source / "figures"
+    paths = [path for path in records if path.startswith(f"{study.figures}/")]
+    paths = [path for path in paths if (inside / PurePosixPath(path).name).is_file()]
+    told = [
+        f"{path}: other bytes"
+        for path in paths
+        if (study.project / path).read_bytes() != (inside / PurePosixPath(path).name).read_bytes()
+    ]
+    words = f"{len(paths) - len(told)} of {len(paths)} the same to the last bit"
+    same_machine = alike(about, study.lock_digest)
+    return Check("figures", words, told if same_machine else [], [] if same_machine else told)
+
+
+def _compare_verdicts(source: Path, found: Path, about: Mapping[str, Any]) -> Check:
+    """Compare the verdicts on claims."""
+    path = source / "claims.csv"
+    path = path if path.is_file() else source / about["results"] / "claims.csv"
+    before, after = _verdicts(path), _verdicts(found / "claims.csv")
+    problems = [
+        f"{name}: {before.get(name, 'no verdict')} became {after.get(name, 'no verdict')}"
+        for name in sorted(before.keys() | after.keys())
+        if before.get(name) != after.get(name)
+    ]
+    return Check("claims", f"{len(before)} verdicts the same", problems)
+
+
+def _verdicts(path: Path) -> dict[str, str]:
+    with path.open(newline="", encoding="utf-8") as lines:
+        rows = list(csv.DictReader(lines))
+    return {row["id"]: row["verdict"] for row in rows}
+
+
+def _compare_left_out(
+    source: Path, study: Study, records: Mapping[str, Record], about: Mapping[str, Any]
+) -> Check:
+    """Compare files that were left out with the digests that were not."""
+    digests = left_out_digests(source)
+    made = sorted(digests.keys() & records.keys())
+    other = []
+    for path in made:
+        seal = study.project / f"{path}.sha256"
+        store = (study.project / path).is_dir()
+        if file_digest(seal if store else study.project / path) != digests[path]:
+            other.append(f"{path}: {_other_chunks(source, seal, path) if store else 'other bytes'}")
+    words = f"{len(made) - len(other)} of {len(made)} the same to the last bit"
+    same_machine = alike(about, study.lock_digest)
+    return Check("left out", words, other if same_machine else [], [] if same_machine else other)
+
+
+def _other_chunks(source: Path, seal: Path, path: str) -> str:
+    """Name the files of a store that are not as its archived seal says."""
+    archived = source / f"{path}.sha256"
+    if not archived.is_file():
+        return "other bytes"
+    before, after = (read_sums(it.read_text(encoding="utf-8")) for it in (archived, seal))
+    names = [name for name in sorted(before | after) if before.get(name) != after.get(name)]
+    return f"{len(names)} of {len(before)} files differ, first {names[0]}"

@@ -1,0 +1,195 @@
+"""The study as seen from outside: its settings, its files, and what Snakemake would do."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import yaml
+
+from keystab.errors import InputError
+from keystab.provenance.code_digest import folder_of_loops
+from keystab.study.settings import Settings, checked, read_yaml
+
+__all__ = ["Output", "Study", "find_project", "jobs_and_reasons"]
+
+_FOLDERS = ("results", "figures", "logs")
+_JOB = re.compile(r"^Job \d+: (.*)\n *[Rr]eason: (.*)$", re.MULTILINE)
+_FOLLOWS = ("Input files updated by another job", "Missing output files")
+_DIGEST = re.compile(r"(?:code of [\w.]+ = |environment\.lock = |')[0-9a-f]{64}'?")  # common.smk
+_LONG = re.compile("Union of exclusive params before and now across all output: ")
+
+
+@dataclasses.dataclass(frozen=True)
+class Output:
+    """A file that the study makes, and whether it is there and up to date."""
+
+    path: str
+    rule: str
+    logs: tuple[str, ...]
+    status: str
+    pending: bool
+
+
+class Study:
+    """A project folder together with the settings that are laid over its own.
+
+    Parameters
+    ----------
+    project : path
+        Folder that holds the Snakefile.
+    overlays : sequence of path
+        Files of settings; later ones win. They are relative to the project unless absolute.
+
+    Raises
+    ------
+    InputError
+        If the folder is no project, or the settings cannot work.
+    """
+
+    def __init__(self, project: Path, overlays: Sequence[Path | str] = ()) -> None:
+        self.project = Path(project)
+        self.overlays = [Path(overlay) for overlay in overlays]
+        if not (self.project / "Snakefile").is_file():
+            raise InputError(f"{project}: no Snakefile there; go to the project's folder")
+        files = [self.project / overlay for overlay in self.overlays]
+        given = read_yaml(self.project / "config/config.yaml", *files)
+        schema = self.project / "workflow/schemas/config.schema.yaml"
+        self.settings: Settings = checked(given, yaml.safe_load(schema.read_text(encoding="utf-8")))
+        self.results, self.figures, self.logs = (str(self.settings[key]) for key in _FOLDERS)
+
+    @property
+    def settings_digest(self) -> str:
+        """SHA-256 of all settings but the names of the folders that results go to."""
+        scientific = {key: value for key, value in self.settings.items() if key not in _FOLDERS}
+        return hashlib.sha256(json.dumps(scientific, sort_keys=True).encode()).hexdigest()
+
+    @property
+    def lock_digest(self) -> str:
+        """SHA-256 of ``environment.lock``."""
+        return hashlib.sha256((self.project / "environment.lock").read_bytes()).hexdigest()
+
+    def outputs(self) -> list[Output]:
+        """Every file that the study makes, sorted by path; nothing is run.
+
+        Raises
+        ------
+        InputError
+            If Snakemake cannot plan the study.
+        """
+        said = self.snakemake("--summary", output_only=True)
+        rows = csv.DictReader(said.splitlines(), delimiter="\t")
+        outputs = [
+            Output(
+                row["output_file"],
+                row["rule"],
+                tuple(log for log in row["log-file(s)"].split(",") if log != "-"),
+                row["status"],
+                row["plan"] != "no update",
+            )
+            for row in rows
+        ]
+        return sorted(outputs, key=lambda output: output.path)
+
+    def to_do(self, *targets: str) -> list[str]:
+        """What Snakemake would run of its own accord, with the reasons; empty where all is done.
+
+        Jobs that would only follow others, or only make again what others need, are not named.
+
+        Raises
+        ------
+        InputError
+            If Snakemake cannot plan the study.
+        """
+        said = self.snakemake("--dry-run", *targets)
+        if "Nothing to be done" in said:
+            return []
+        found = jobs_and_reasons(said)
+        own = {
+            job: "; ".join(it for it in why.split("; ") if not it.startswith(_FOLLOWS))
+            for job, why in found
+        }
+        jobs = {job: why for job, why in own.items() if why} or dict(found)
+        shortened = {job: _LONG.sub("", why).strip() for job, why in jobs.items()}
+        told = [f"{job}: {_DIGEST.sub('code or lock', why)}" for job, why in shortened.items()]
+        return told or ["jobs that snakemake --dry-run names"]
+
+    def run(self, cores: int, *targets: str) -> None:
+        """Make targets, or the whole study, showing what Snakemake says.
+
+        Raises
+        ------
+        InputError
+            If a job fails.
+        """
+        arguments = [*self._command(), "--cores", str(cores), *self._files(), "--", *targets]
+        status = subprocess.run(arguments, cwd=self.project, env=_environment()).returncode
+        if status:
+            raise InputError("the study stopped before its end; the reason stands above")
+
+    def snakemake(self, *arguments: str, output_only: bool = False) -> str:
+        """What Snakemake says to some arguments.
+
+        Raises
+        ------
+        InputError
+            If it fails; with its last line.
+        """
+        flags = [argument for argument in arguments if argument.startswith("-")]
+        targets = [argument for argument in arguments if not argument.startswith("-")]
+        command = [*self._command(), "--cores", "1", *flags, *self._files(), "--", *targets]
+        run = subprocess.run(
+            command, cwd=self.project, env=_environment(), capture_output=True, text=True
+        )
+        if run.returncode:
+            lines = (run.stdout + run.stderr).strip().splitlines() or ["it says nothing"]
+            raise InputError(f"snakemake {' '.join(arguments)} failed: {lines[-1].strip()}")
+        return run.stdout if output_only else run.stdout + run.stderr
+
+    def _command(self) -> list[str]:
+        return [sys.executable, "-m", "snakemake"]
+
+    def _files(self) -> list[str]:
+        if not self.overlays:
+            return []
+        return ["--configfile", *(str(overlay) for overlay in self.overlays)]
+
+
+def jobs_and_reasons(plan: str) -> list[tuple[str, str]]:
+    """Jobs of a dry run, by what they say about themselves, with Snakemake's reasons."""
+    return _JOB.findall(plan)
+
+
+def find_project(start: Path | None = None) -> Path:
+    """Folder of the project that a folder, the current one by default, lies in.
+
+    Raises
+    ------
+    InputError
+        If it lies in none.
+    """
+    start = (start or Path.cwd()).absolute()
+    for folder in (start, *start.parents):
+        if (folder / "Snakefile").is_file() and (folder / "environment.lock").is_file():
+            return folder
+    raise InputError(f"{start} lies in no copy of the project; go to the project's folder")
+
+
+def _environment() -> dict[str, str]:
+    """Variables under which Snakemake, and the jobs that it starts, find this very library."""
+    library = Path(__file__).parents[2]
+    paths = [str(Path(sys.executable).parent), os.environ.get("PATH", "")]
+    return {
+        "NUMBA_CACHE_DIR": str(folder_of_loops(library.parent)),
+        **os.environ,
+        "PYTHONPATH": str(library),
+        "PATH": os.pathsep.join(paths),
+    }

@@ -1,0 +1,1 @@
+"""The settings of the study, whether they can work, and its verdicts on claims."""
