@@ -180,7 +180,7 @@ def sources_of_pictures():
 
 def ledgers_of_pictures(_wildcards):
     """Ledgers of all pictures."""
-    return [source.ledger for source in sources_of_pictures()]
+    return [source.report for source in sources_of_pictures()]
 
 
 def names_of_pictures(_wildcards):

@@ -23,7 +23,7 @@ from keystab.errors import InputError
 from keystab.io.checksums import verify as verify_seal
 from keystab.provenance import table_differences
 from keystab.provenance.archive import ABOUT, LEFT_OUT, SUMS, arithmetic, read_sums
-from keystab.provenance.lineage import code_of_figure, file_digest, read_passport
+from keystab.provenance.lineage import code_of_figure, file_digest, read_figure_metadata
 from keystab.provenance.snakemake_records import Record, read_records, upstream
 from keystab.provenance.study_folder import Study
 
@@ -231,7 +231,7 @@ def _check_figures(folder: Path, about: Mapping[str, Any], project: Path) -> Che
     for path in figures:
         name = path.relative_to(folder).as_posix()
         try:
-            passport = read_passport(path)
+            passport = read_figure_metadata(path)
         except InputError as error:
             problems.append(f"{name}{str(error).removeprefix(str(path))}")
             continue

@@ -7,11 +7,11 @@ from typing import Any
 
 import pandas as pd
 
-from keystab.evaluation.recall_precision import judged, with_positions
+from keystab.evaluation.recall_precision import recall_and_precision, with_positions
 from keystab.stages._compared import compared, tolerances
 
 
-def judged_in_octave(
+def recall_and_precision_in_octave(
     found: pd.DataFrame,
     truth: pd.DataFrame,
     shape: tuple[int, int],
@@ -21,6 +21,6 @@ def judged_in_octave(
     """Hold detections against true extrema in the range that is compared."""
     inside = compared(args, shape)
     finite = with_positions(found)
-    return judged(
+    return recall_and_precision(
         finite, truth, inside(finite, scale_column), inside(truth, "sigma"), **tolerances(args)
     )

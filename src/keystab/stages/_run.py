@@ -74,9 +74,9 @@ def required(to: argparse.ArgumentParser, name: str, what: str, **options: objec
 
 
 def views_arguments(to: argparse.ArgumentParser) -> None:
-    """Add the store of views and its seal."""
+    """Add the store of views and its checksums."""
     required(to, "views", "store of the views", type=Path)
-    required(to, "views-digest", "seal of the store", type=Path)
+    required(to, "views-digest", "checksums of the store", type=Path)
 
 
 def detector_arguments(to: argparse.ArgumentParser) -> None:
@@ -99,11 +99,11 @@ def view_detector_arguments(to: argparse.ArgumentParser) -> None:
 def store_arguments(to: argparse.ArgumentParser) -> None:
     """Add where scale-spaces are stored; without them they are streamed."""
     to.add_argument("--store", type=Path, help="stored scale-space to search")
-    to.add_argument("--store-digest", type=Path, help="seal of --store")
+    to.add_argument("--store-digest", type=Path, help="checksums of --store")
 
 
 def require_both_or_neither(parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
-    """Stop where a store is given without its seal, or a seal without its store."""
+    """Stop where a store is given without its checksums, or these without their store."""
     if (args.store is None) != (args.store_digest is None):
         parser.error("--store and --store-digest go together: give both or neither")
 
@@ -122,7 +122,7 @@ def range_arguments(to: argparse.ArgumentParser) -> None:
     required(to, "last-scale", last, type=optional(float))
 
 
-def judged_arguments(to: argparse.ArgumentParser) -> None:
+def truth_arguments(to: argparse.ArgumentParser) -> None:
     """Add what decides which detections are held against true extrema, and when they agree."""
     required(to, "border", "pixels left out at the border of the view", type=float)
     required(to, "first-scale", "lower end of the scale range, over sigma-min", type=float)

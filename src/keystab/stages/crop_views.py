@@ -13,7 +13,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Read the first view of every set; write the pixels of a square in its middle."""
     parser = _run.parser(__doc__)
     _run.required(parser, "views", "stores of the sets", type=Path, nargs="+")
-    _run.required(parser, "views-digest", "their seals", type=Path, nargs="+")
+    _run.required(parser, "views-digest", "their checksums", type=Path, nargs="+")
     _run.required(parser, "name", "name of the value in which the sets differ")
     _run.required(parser, "values", "the value of each set", type=float, nargs="+")
     _run.required(parser, "size", "pixels a side", type=int)

@@ -10,7 +10,7 @@ from keystab.stages import _run
 
 @_run.stage
 def main(argv: Sequence[str] | None = None) -> None:
-    """Read claims and tables; write the ledger as CSV, JSON and Markdown; print the tally."""
+    """Read claims and tables; write the verdicts as CSV, JSON and Markdown; print the tally."""
     parser = _run.parser(__doc__)
     _run.required(parser, "claims", "file of claims", type=Path)
     _run.required(parser, "tables", "folder of the tables", type=Path)
@@ -21,14 +21,14 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.io.tables import read_table
     from keystab.study.claims import read_claims, table_names
-    from keystab.study.claims_report import write_ledger
-    from keystab.study.verdicts import judge_all, tally
+    from keystab.study.claims_report import write_report
+    from keystab.study.verdicts import outcomes_of, tally
 
     claims = read_claims(args.claims)
     tables = {name: read_table(args.tables / f"{name}.csv") for name in table_names(claims)}
-    judgements = judge_all(claims, tables)
-    write_ledger(judgements, args.csv, args.json, args.markdown)
-    for verdict, number in tally(judgements).items():
+    outcomes = outcomes_of(claims, tables)
+    write_report(outcomes, args.csv, args.json, args.markdown)
+    for verdict, number in tally(outcomes).items():
         print(f"{number:3d} {verdict}")
 
 

@@ -18,7 +18,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "extrema", "extrema of all ratios", type=Path)
     _run.required(parser, "traces", "their refinement traces", type=Path)
     _run.required(parser, "sigma-min", "first scale in pixels", type=float)
-    _run.judged_arguments(parser)
+    _run.truth_arguments(parser)
     _run.refinement_arguments(parser)
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.detection.refinement import refined_keypoints
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
-    from keystab.stages._against_truth import judged_in_octave
+    from keystab.stages._against_truth import recall_and_precision_in_octave
 
     view, extrema = read_view(args.views, args.views_digest), read_table(args.extrema)
     refined = refined_keypoints(
@@ -43,8 +43,8 @@ def main(argv: Sequence[str] | None = None) -> None:
             ("refined", refined, "sigma"),
         ):
             here = found[np.isclose(found["kappa"], kappa)].reset_index(drop=True)
-            judgement = judged_in_octave(here, truth, view.shape, args, scale)
-            rows.append({"kappa": kappa, "detections": name} | judgement)
+            scores = recall_and_precision_in_octave(here, truth, view.shape, args, scale)
+            rows.append({"kappa": kappa, "detections": name} | scores)
     table = pd.DataFrame(rows)
     write_table(table, args.table)
     print(table[["kappa", "detections", "n_true", "recall", "precision"]].to_string(index=False))

@@ -17,7 +17,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "features", "table of their features", type=Path)
     _run.label_arguments(parser)
     _run.required(parser, "sigma-min", "first scale in pixels", type=float)
-    _run.judged_arguments(parser)
+    _run.truth_arguments(parser)
     _run.required(parser, "n-resamples", "bootstrap resamples", type=int)
     _run.required(parser, "causes", "table of causes to write", type=Path)
     _run.required(parser, "auc", "table of areas to write", type=Path)

@@ -17,7 +17,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "samplings", "extrema of the samplings", type=Path, nargs="+")
     _run.required(parser, "n-spo", "n_spo of --samplings", type=int, nargs="+")
     _run.detector_arguments(parser)
-    _run.judged_arguments(parser)
+    _run.truth_arguments(parser)
     _run.required(parser, "max-offsets", "values of M_offset", type=float, nargs="+")
     _run.required(parser, "most-iterations", "largest finite N_interp", type=int)
     _run.required(parser, "table", "table to write", type=Path)

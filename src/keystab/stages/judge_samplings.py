@@ -18,7 +18,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "traces", "refinement traces of the samplings", type=Path, nargs="+")
     _run.required(parser, "n-spo", "n_spo of --samplings", type=int, nargs="+")
     _run.detector_arguments(parser)
-    _run.judged_arguments(parser)
+    _run.truth_arguments(parser)
     _run.refinement_arguments(parser)
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling, balanced_delta
-    from keystab.stages._against_truth import judged_in_octave
+    from keystab.stages._against_truth import recall_and_precision_in_octave
 
     view, truth = read_view(args.views, args.views_digest), read_table(args.truth)
     rows = []
@@ -47,8 +47,8 @@ def main(argv: Sequence[str] | None = None) -> None:
             ("discrete", extrema, "step_sigma"),
             ("refined", refined, "sigma"),
         ):
-            judgement = judged_in_octave(found, truth, view.shape, args, scale)
-            rows.append(labels | {"detections": name} | judgement)
+            scores = recall_and_precision_in_octave(found, truth, view.shape, args, scale)
+            rows.append(labels | {"detections": name} | scores)
     table = pd.DataFrame(rows)
     write_table(table, args.table)
     print(table[["n_spo", "detections", "recall", "precision"]].to_string(index=False))

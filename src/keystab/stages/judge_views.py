@@ -15,7 +15,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.views_arguments(parser)
     _run.required(parser, "truth", "extrema of the scene in the view of --views", type=Path)
     _run.required(parser, "sets", "stores of the sets", type=Path, nargs="+")
-    _run.required(parser, "sets-digest", "their seals", type=Path, nargs="+")
+    _run.required(parser, "sets-digest", "their checksums", type=Path, nargs="+")
     _run.required(parser, "extrema", "extrema of each set", type=Path, nargs="+")
     _run.required(parser, "traces", "their refinement traces", type=Path, nargs="+")
     _run.required(parser, "sweeps", "sweep that each set is a member of", nargs="+")
@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "n-spo", "n_spo of each", type=int, nargs="+")
     _run.required(parser, "guards", "guard band of each set, pixels", type=float, nargs="+")
     _run.required(parser, "sigma-min", "first scale in pixels", type=float)
-    _run.judged_arguments(parser)
+    _run.truth_arguments(parser)
     _run.refinement_arguments(parser)
     _run.required(parser, "table", "table to write", type=Path)
     args = parser.parse_args(argv)
@@ -67,11 +67,11 @@ def main(argv: Sequence[str] | None = None) -> None:
             ),
         ):
             common = field.common(table, scale)
-            judgement = mean_over_views(
+            scores = mean_over_views(
                 common, truth, len(field.specs), limits, scale, tolerances(args)
             )
             labels = {"sweep": sweep, "value": value, "n_spo": n_spo, "detections": detections}
-            rows.append(labels | judgement)
+            rows.append(labels | scores)
     table = pd.DataFrame(rows)
     write_table(table, args.table)
     print(table[[*labels, "recall", "precision"]].to_string(index=False))

@@ -28,8 +28,8 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.experiments.sampling_stability import (
         change_counts,
+        keypoints_of_samplings,
         long_matches,
-        match_samplings,
         summary,
     )
     from keystab.io.tables import write_table
@@ -42,8 +42,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     extrema = read_extrema(args.samplings)
     common, same = comparable_only(extrema, view.shape, args), same_options(args)
     steps = {n_spo: balanced_delta(n_spo, args.kappa, args.sigma_min) for n_spo in args.n_spo}
-    matched = match_samplings(common, args.n_spo, same)
-    reverse = match_samplings(common, args.n_spo, same, reverse_order=True)
+    matched = keypoints_of_samplings(common, args.n_spo, same)
+    reverse = keypoints_of_samplings(common, args.n_spo, same, reverse_order=True)
     pairs = long_matches(matched, args.n_spo, common["row_in_file"].to_numpy())
     seen = pairs.assign(detected=(pairs["row"] >= 0).astype(int))
     write_table(pairs, args.matches)

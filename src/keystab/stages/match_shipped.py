@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.detection.refinement import refined_keypoints
     from keystab.detection.sift_filters import passes_filters
-    from keystab.experiments.view_stability import count_table, curve_table, match_views
+    from keystab.experiments.view_stability import count_table, curve_table, keypoints_of_views
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_views
     from keystab.stages._compared import common_range, same_options
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     filtered = keypoints[passes_filters(keypoints, args.contrast, args.edge_ratio)]
     curves, counts = [], []
     for name, table in (("unfiltered", keypoints), ("filtered", filtered)):
-        matched = match_views(everywhere.common(table), len(views), same)
+        matched = keypoints_of_views(everywhere.common(table), len(views), same)
         curves.append(curve_table(matched, {"shipped": name}, args.n_resamples))
         counts.append(count_table(matched, {"shipped": name}))
     write_table(pd.concat(curves, ignore_index=True), args.curves)

@@ -13,7 +13,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Read extrema and traces of several sets at one sampling; write tables of all."""
     parser = _run.parser(__doc__)
     _run.required(parser, "views", "stores of the sets", type=Path, nargs="+")
-    _run.required(parser, "views-digest", "their seals", type=Path, nargs="+")
+    _run.required(parser, "views-digest", "their checksums", type=Path, nargs="+")
     _run.required(parser, "extrema", "extrema of each set", type=Path, nargs="+")
     _run.required(parser, "traces", "their refinement traces", type=Path, nargs="+")
     _run.required(parser, "name", "name of the value in which the sets differ")
@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.experiments.view_stability import (
         count_table,
         curve_table,
-        match_views,
+        keypoints_of_views,
         scale_table,
     )
     from keystab.io.tables import read_table, write_table
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             read_table(extrema), read_table(traces), args.max_offset, args.max_iterations
         )
         labels = {args.name: value}
-        matched = match_views(everywhere.common(keypoints), len(views), same)
+        matched = keypoints_of_views(everywhere.common(keypoints), len(views), same)
         curves.append(curve_table(matched, labels, args.n_resamples))
         counts.append(count_table(matched, labels))
         if args.scales:

@@ -13,7 +13,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Read the extrema of every variant; write rates against n_spo, and a summary."""
     parser = _run.parser(__doc__)
     _run.required(parser, "views", "store of the view of each variant", type=Path, nargs="+")
-    _run.required(parser, "views-digest", "their seals", type=Path, nargs="+")
+    _run.required(parser, "views-digest", "their checksums", type=Path, nargs="+")
     _run.required(parser, "extrema", "extrema of each variant", type=Path, nargs="+")
     _run.required(parser, "names", "names of the variants", nargs="+")
     least = "least difference to the 26 neighbours in each variant, of grey values in [0, 1]"
@@ -29,7 +29,11 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import pandas as pd
 
-    from keystab.experiments.sampling_stability import change_counts, floor_summary, match_samplings
+    from keystab.experiments.sampling_stability import (
+        change_counts,
+        floor_summary,
+        keypoints_of_samplings,
+    )
     from keystab.experiments.view_stability import labelled
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
@@ -46,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         extrema = extrema[extrema["difference"] > tolerance].reset_index(drop=True)
         common = comparable_only(extrema, read_view(store, digest).shape, args)
         counts = change_counts(extrema, common, steps, same)
-        stability = match_samplings(common, args.n_spo, same).keypoints["stability"]
+        stability = keypoints_of_samplings(common, args.n_spo, same).keypoints["stability"]
         rates.append(labelled(counts, {"variant": name}))
         summary = floor_summary(counts, stability, args.settles_at)
         summaries.append(labelled(summary, {"variant": name}))

@@ -37,8 +37,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.experiments.view_stability import (
         count_table,
         curve_table,
-        match_views,
-        precision_table,
+        keypoints_of_views,
+        localization_table,
     )
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_views
@@ -62,13 +62,13 @@ def main(argv: Sequence[str] | None = None) -> None:
                 n_interp = math.inf if choice[1] >= MOST_MODELS else choice[1]
                 labels = {"n_spo": n_spo, "detections": "refined"}
                 labels |= {"max_offset": choice[0], "max_iterations": n_interp}
-            matched = match_views(common, len(views), same)
+            matched = keypoints_of_views(common, len(views), same)
             counts.append(count_table(matched, labels))
             if drawn:
                 curves.append(curve_table(matched, labels, args.n_resamples))
             if choice in (None, usual):
                 precision.append(
-                    precision_table(matched, labels, args.minimum_share, args.n_resamples)
+                    localization_table(matched, labels, args.minimum_share, args.n_resamples)
                 )
     write_table(pd.concat(curves, ignore_index=True), args.curves)
     write_table(pd.concat(precision, ignore_index=True), args.precision)

@@ -10,16 +10,16 @@ from keystab.stages import _run
 
 @_run.stage
 def main(argv: Sequence[str] | None = None) -> None:
-    """Read the view, evaluate its scale-space into a store, seal it."""
+    """Read the view, evaluate its scale-space into a store, with checksums."""
     parser = _run.parser(__doc__)
     _run.views_arguments(parser)
     _run.required(parser, "n-spo", "scales per octave", type=int)
     _run.detector_arguments(parser)
     _run.required(parser, "store", "store to write", type=Path)
-    _run.required(parser, "digest", "seal of the store to write", type=Path)
+    _run.required(parser, "digest", "checksums of the store to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.io.checksums import write_seal
+    from keystab.io.checksums import write_checksums
     from keystab.io.scale_space_store import write_scale_space
     from keystab.io.view_store import read_view
     from keystab.scalespace.dog import scale_space
@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         oversampling=args.oversampling,
     )
     write_scale_space(space, args.store)
-    write_seal(args.store, args.digest)
+    write_checksums(args.store, args.digest)
     print("x".join(map(str, space.shape)), "samples")
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from keystab.stages import _run
 
 _PICTURE = (
-    "NAME, store of its views, seal, unique keypoints, true extrema, extrema of samplings ..."
+    "NAME, store of its views, checksums, unique keypoints, true extrema, extrema of samplings ..."
 )
 
 

@@ -10,7 +10,7 @@ from keystab.stages import _run
 
 @_run.stage
 def main(argv: Sequence[str] | None = None) -> None:
-    """Read the picture, take the views, write and seal the store."""
+    """Read the picture, take the views, write the store and its checksums."""
     parser = _run.parser(__doc__)
     required = _run.required
     required(parser, "reference", "picture", type=Path)
@@ -30,13 +30,13 @@ def main(argv: Sequence[str] | None = None) -> None:
     required(parser, "guard", "width of the guard band, pixels", type=int)
     required(parser, "dtype", "number type in the store", choices=("float32", "float64"))
     required(parser, "store", "store to write", type=Path)
-    required(parser, "digest", "seal of the store to write", type=Path)
+    required(parser, "digest", "checksums of the store to write", type=Path)
     args = parser.parse_args(argv)
 
     from keystab.camera.simulation import Scene, simulate
     from keystab.camera.view_sets import view_specs
     from keystab.errors import InputError
-    from keystab.io.checksums import write_seal
+    from keystab.io.checksums import write_checksums
     from keystab.io.pictures import read_with_digest
     from keystab.io.view_store import write_views
 
@@ -56,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     }
     images = (simulate(scene, spec) for spec in specs)
     write_views(images, specs, args.store, attributes, args.dtype)
-    write_seal(args.store, args.digest)
+    write_checksums(args.store, args.digest)
     print(f"{len(specs)} view(s), the first of {specs[0].shape[0]} x {specs[0].shape[1]} px")
 
 
