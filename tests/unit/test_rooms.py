@@ -29,7 +29,7 @@ ROOMS = {
     "prediction": "root scalespace",
     "experiments": "root utils scalespace camera matching detection evaluation prediction",
     "study": "root utils scalespace camera io matching evaluation",
-    "provenance": "root utils io study",
+    "provenance": "root utils io evaluation study",
     "stages": "root utils scalespace camera io matching detection evaluation truth prediction "
     "experiments study provenance",
     "figures": "root utils io",  # tables, and no science

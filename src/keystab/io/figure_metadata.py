@@ -23,6 +23,8 @@ PNG_KEY = "keystab"
 """Text chunk of a PNG that holds them; a PDF has it in ``/Keywords`` of its ``/Info``."""
 
 _DIGEST = re.compile("[0-9a-f]{64}")
+_NAME = re.compile(r"[A-Za-z0-9]\w*", re.ASCII)
+_FILE = re.compile(r"\w[\w.+-]*")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,12 +87,16 @@ class FigureMetadata:
             fields = json.loads(text)
             config = fields.pop("config")
             metadata = cls(**fields)
+            # Names become paths: a stranger's must not lead elsewhere.
             sound = (
                 isinstance(metadata.settings, dict)
+                and _NAME.fullmatch(metadata.figure)
+                and isinstance(metadata.version, str)
+                and all(map(_FILE.fullmatch, metadata.tables))
                 and all(map(_DIGEST.fullmatch, metadata.tables.values()))
                 and all(_DIGEST.fullmatch(it) for it in (metadata.code, metadata.lock) if it)
             )
-        except (ValueError, TypeError, AttributeError, KeyError):
+        except (ValueError, TypeError, AttributeError, KeyError, RecursionError):
             raise InputError("no metadata of keystab") from None
         if not sound or config != metadata.config:
             raise InputError("its metadata were changed by hand or damaged")
