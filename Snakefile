@@ -2,7 +2,7 @@
 
 Comes in: a picture and the settings of config/config.yaml.
 Goes out: figures/figN.pdf and .png, with the numbers that they draw in results/tables/figN*.csv,
-and results/claims.md, a verdict for every claim of the paper.
+results/claims.md, a verdict for every claim of the paper, and results/final.sha256, their digests.
 
     snakemake -j2                                      the whole study
     snakemake figures/fig5.pdf -j2                     one figure
@@ -58,15 +58,29 @@ FIGURES += ["figS1", "figS2", "figS3", "figS4"]
 FIGURES += ["floor", "truth", "refinement", "predictors"]
 
 
+# Tables that no figure draws and no claim needs.
+TABLES_NOT_DRAWN = ["fig5_features.csv", "predictors_detections.parquet", "refinement.csv"]
+
+# All that the study ends in. What figures draw is named too: Snakemake would not miss a lost table
+# whose figure is there.
+FINAL = sorted(
+    {
+        *expand(f"{DRAWN}/{{figure}}.{{kind}}", figure=FIGURES, kind=["pdf", "png"]),
+        *(table for figure in FIGURES for table in getattr(rules, figure).input),
+        *expand(f"{RESULTS}/tables/{{table}}", table=TABLES_NOT_DRAWN),
+        *rules.claims.input.tables,
+        *rules.claims.output,
+    }
+)
+
+
+include: "workflow/rules/checksums.smk"  # all of these -> one list of digests
+
+
 rule all:
     """Every figure, every table, and the verdicts."""
     default_target: True
     input:
-        expand(f"{DRAWN}/{{figure}}.{{kind}}", figure=FIGURES, kind=["pdf", "png"]),
-        # What figures draw is asked for too: Snakemake would not miss a lost table whose figure is there.
-        [getattr(rules, figure).input for figure in FIGURES],
-        f"{RESULTS}/tables/fig5_features.csv",
-        f"{RESULTS}/tables/predictors_detections.parquet",
-        f"{RESULTS}/tables/refinement.csv",
-        f"{RESULTS}/claims.md",
+        FINAL,
+        f"{RESULTS}/final.sha256",
         expand(f"{RESULTS}/scale_space/n{{n_spo}}.sha256", n_spo=KEPT),

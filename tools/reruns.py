@@ -100,7 +100,9 @@ def _jobs(dag: Any, persistence: Any) -> Plan:
     jobs: Plan = {}
     for level in dag.toposorted():
         for job in sorted(level, key=lambda job: job.output[0] if job.output else ""):
-            if job.output:  # all but the rule that names the targets
+            # All but the rule that names the targets and the one that lists their digests, which
+            # runs after any other.
+            if job.output and job.rule.name != "checksums":
                 jobs[str(job.output[0])] = Job(
                     job.rule.name,
                     str(job.message),
@@ -205,7 +207,7 @@ def change(place: str, schema: Mapping[str, Any]) -> dict[str, Any]:
 
 def _laid_over(above: Mapping[str, Any]) -> dict[str, Any]:
     merged = copy.deepcopy(BASE)
-    settings._merge(merged, above)
+    settings.merge(merged, above)
     return merged
 
 

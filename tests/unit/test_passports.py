@@ -51,8 +51,9 @@ def figure(request, tmp_path):
 @settings(max_examples=30)
 @given(
     st.builds(
-        Passport, SIMPLE, SIMPLE, st.none() | DIGEST, st.none() | DIGEST,
-        st.dictionaries(SIMPLE, SIMPLE, max_size=3), st.dictionaries(SIMPLE, DIGEST, max_size=3),
+        Passport, st.from_regex("[a-z][a-zA-Z0-9_]*", fullmatch=True), SIMPLE,
+        st.none() | DIGEST, st.none() | DIGEST, st.dictionaries(SIMPLE, SIMPLE, max_size=3),
+        st.dictionaries(st.from_regex(r"\w[\w.]*", fullmatch=True), DIGEST, max_size=3),
     )
 )  # fmt: skip
 def test_a_passport_is_read_as_it_was_written(passport):
@@ -90,6 +91,27 @@ def test_a_changed_passport_is_refused(old, new):
     assert old in text
     with pytest.raises(InputError, match="no passport of keystab|changed by hand or damaged"):
         Passport.from_text(text.replace(old, new, 1))
+
+
+@pytest.mark.parametrize("figure", ["", "../fig5", "fig5/x", "fig5\n", "/etc/x", "fig.5"])
+def test_a_figure_that_could_be_a_path_is_refused(figure):
+    text = dataclasses.replace(PASSPORT, figure=figure).to_text()
+    with pytest.raises(InputError, match="changed by hand or damaged"):
+        Passport.from_text(text)
+
+
+@pytest.mark.parametrize("table", ["../one.csv", "/etc/passwd", "a/b.csv", "", ".hidden"])
+def test_a_table_that_could_be_a_path_is_refused(table):
+    text = dataclasses.replace(PASSPORT, tables={table: 64 * "0"}).to_text()
+    with pytest.raises(InputError, match="changed by hand or damaged"):
+        Passport.from_text(text)
+
+
+def test_what_a_figure_carries_is_found_without_decoding_it(figure):
+    assert read_passport(figure, as_drawn=True) == PASSPORT
+    spoilt = dataclasses.replace(PASSPORT, settings={"draft": "a (b) \\ c"})
+    save(drawing(), figure, passport=spoilt)
+    assert read_passport(figure, as_drawn=True) == spoilt
 
 
 def test_figures_carry_their_passport_and_no_time(figure):

@@ -29,7 +29,8 @@ def imported(path: Path) -> set[str]:
 
 
 LAST = ("snakemake_records", "study_folder", "lineage", "table_differences", "ro_crate", "archive")
-LAST += ("verification", "recomputation")
+LAST += ("verification", "recomputation", "unpacking", "archived_settings", "run_description")
+LAST += ("result_checks", "column_relations")
 IMPORTS = {name: imported(path) for name, path in FILES.items()}
 
 

@@ -16,9 +16,11 @@ from project import QUICK, forked
 
 from keystab.cli import main as cli
 from keystab.errors import InputError
-from keystab.provenance import archive, lineage, recomputation, verification
+from keystab.provenance import archive, lineage, recomputation, result_checks, verification
 from keystab.provenance.code_digest import fingerprint
+from keystab.provenance.run_description import ABOUT, LEFT_OUT, SUMS
 from keystab.provenance.study_folder import Study
+from keystab.provenance.unpacking import Unpacked, unpacked
 
 CODE = fingerprint("keystab.figures.fig1")
 
@@ -62,13 +64,18 @@ def rewritten(packed: Path, target: Path, changes: dict[str, bytes | None], forg
     members = {name: data for name, data in (members | changes).items() if data is not None}
     if forge:
         sums = {name: hashlib.sha256(data).hexdigest() for name, data in members.items()}
-        del sums[archive.SUMS]
+        del sums[SUMS]
         lines = [f"{digest}  {name}\n" for name, digest in sums.items()]
-        members[archive.SUMS] = "".join(lines).encode()
+        members[SUMS] = "".join(lines).encode()
     with zipfile.ZipFile(target, "w") as file:
         for name, data in members.items():
             file.writestr(name, data)
     return target
+
+
+def digests(held: Unpacked) -> list[str]:
+    """What the list of digests of an archive does not agree with."""
+    return verification.check_digests(verification._listed(held.folder), held.digests).problems
 
 
 def found(path: Path, project: Path) -> dict[str, list[str]]:
@@ -92,7 +99,7 @@ def test_an_archive_is_verified_without_its_intermediate_files(packed, clone):
 
 def test_what_is_left_out_is_listed_with_digests(packed, ran):
     with zipfile.ZipFile(packed) as file:
-        rows = file.read(archive.LEFT_OUT).decode().splitlines()
+        rows = file.read(LEFT_OUT).decode().splitlines()
         guide = file.read("ARCHIVE.md").decode()
     keypoints = (ran.project / "results/keypoints/still.csv").read_bytes()
     seal = (ran.project / "results/views/still.sha256").read_bytes()
@@ -119,7 +126,7 @@ def test_the_same_run_gives_the_same_bytes_and_no_time(packed, here, tmp_path):
         assert {info.date_time for info in infos} == {(1980, 1, 1, 0, 0, 0)}
         assert [info.filename for info in infos] == sorted(info.filename for info in infos)
         records = [name for name in file.namelist() if name.startswith(".snakemake/metadata/")]
-        assert len(records) == 7
+        assert len(records) == 10
         for name in records:
             record = json.loads(file.read(name))
             assert record["starttime"] == 0.0 and 0 <= record["endtime"] < 60
@@ -140,7 +147,7 @@ def test_results_whose_intermediate_files_were_deleted_are_packed_all_the_same(
     again = archive.pack(here, tmp_path / "again.zip")
     with zipfile.ZipFile(packed) as one, zipfile.ZipFile(again) as other:
         before, after = (
-            [line.split(",")[2] for line in file.read(archive.LEFT_OUT).decode().splitlines()]
+            [line.split(",")[2] for line in file.read(LEFT_OUT).decode().splitlines()]
             for file in (one, other)
         )
     assert before == after
@@ -153,10 +160,8 @@ def test_a_file_that_was_tampered_with_is_named(packed, tmp_path, name):
     with zipfile.ZipFile(packed) as file:
         data = bytearray(file.read(name))
     data[len(data) // 2] ^= 1
-    with verification.unpacked(
-        rewritten(packed, tmp_path / "t.zip", {name: bytes(data)}, False)
-    ) as folder:
-        assert verification.check_digests(folder).problems == [f"{name}: damaged or changed"]
+    with unpacked(rewritten(packed, tmp_path / "t.zip", {name: bytes(data)}, False)) as held:
+        assert digests(held) == [f"{name}: damaged or changed"]
 
 
 def test_files_lost_added_and_damaged_in_the_zip_are_named(packed, tmp_path):
@@ -165,8 +170,8 @@ def test_files_lost_added_and_damaged_in_the_zip_are_named(packed, tmp_path):
     data = path.read_bytes()
     assert data.count(b"free\n") == 1
     path.write_bytes(data.replace(b"free\n", b"fred\n"))  # the checksum in the zip is the old one
-    with verification.unpacked(path) as folder:
-        assert verification.check_digests(folder).problems == [
+    with unpacked(path) as held:
+        assert digests(held) == [
             "results/claims.csv: missing",
             "LICENSE: damaged or changed",
             "more.txt: not in SHA256SUMS",
@@ -190,9 +195,9 @@ def test_a_forged_table_does_not_pass_though_all_digests_were_adapted(packed, cl
 
 def test_a_forged_seal_does_not_pass(packed, tmp_path):
     changes: dict[str, bytes | None] = {"results/views/still.sha256": 64 * b"0" + b"  a\n"}
-    with verification.unpacked(rewritten(packed, tmp_path / "t.zip", changes, True)) as folder:
-        records = verification.read_records(folder)
-        check = verification._check_inputs(records, folder, verification.left_out_digests(folder))
+    with unpacked(rewritten(packed, tmp_path / "t.zip", changes, True)) as held:
+        elsewhere = result_checks.left_out_digests(held.folder) | dict(held.digests)
+        check = verification.check_inputs(verification._run_of(held), elsewhere)
     assert check.problems == [
         "results/views/still.sha256: not as it was when others were made from it"
     ]
@@ -223,9 +228,9 @@ def test_other_settings_code_and_lock_are_told_apart(packed, clone):
 
 
 def test_figures_of_other_code_are_named(packed, ran, monkeypatch):
-    monkeypatch.setattr(verification, "code_of_figure", lambda figure: 64 * "0")
-    with verification.unpacked(packed) as folder:
-        check = verification._check_figures(folder, verification.read_about(folder), ran.project)
+    monkeypatch.setattr(result_checks, "code_of_figure", lambda figure: 64 * "0")
+    with unpacked(packed) as held:
+        check = result_checks.check_figures(verification._run_of(held), ran.lock_digest)
     assert check.problems == [
         f"figures/fig1.{kind}: drawn by other code than is here" for kind in ("pdf", "png")
     ]
@@ -272,8 +277,9 @@ def test_results_that_are_here_are_checked_down_to_the_chunk(here, monkeypatch, 
 
 
 def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp_path):
-    with verification.unpacked(packed) as source:
-        checks, sound = recomputation.recompute(source, clone, ["all"], 1)
+    with unpacked(packed) as held:
+        source = held.folder
+        checks, sound = recomputation.recompute(held, clone, ["all"], 1)
         assert sound and [check.what for check in checks] == [
             "tables",
             "figures",
@@ -282,7 +288,7 @@ def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp
         ]
         assert checks[0].words.startswith("1 of 1 the same to the last bit (same lock")
         (clone / "config/scene.txt").write_text("5,0.2500000001\n7,\n")
-        checks, sound = recomputation.recompute(source, clone, ["fig1"], 1)
+        checks, sound = recomputation.recompute(held, clone, ["fig1"], 1)
         assert not sound
         tables, figures, left_out = (check.problems for check in checks)
         assert tables == [
@@ -292,17 +298,17 @@ def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp
         assert "results/views/still: 1 of 2 files differ, first b" in left_out
 
         # The same run from another processor: numbers may differ by rounding, and no more.
-        about = json.loads((source / archive.ABOUT).read_text())
-        (source / archive.ABOUT).write_text(json.dumps(about | {"arithmetic": "another"}))
+        about = json.loads((source / ABOUT).read_text())
+        (source / ABOUT).write_text(json.dumps(about | {"arithmetic": "another"}))
         made = tmp_path / "made"
         (made / "tables").mkdir(parents=True)
         (made / "tables/fig1.csv").write_text("n_spo,found\n3,1.1\n5,0.2500000001\n7,\n")
-        check = verification.compare_tables(source, made, about["lock"])
+        check = result_checks.compare_tables(source, made, about["lock"])
         assert check.problems == [] and "by 1e-10" in check.notes[0]
         (made / "tables/fig1.csv").write_text("n_spo,found\n3,1.1\n5,0.2501\n7,\n")
-        assert "by 0.0001" in verification.compare_tables(source, made, about["lock"]).problems[0]
+        assert "by 0.0001" in result_checks.compare_tables(source, made, about["lock"]).problems[0]
         with pytest.raises(InputError, match="fig9: no figure; give fig1 or all"):
-            recomputation.recompute(source, clone, ["fig9"], 1)
+            recomputation.recompute(held, clone, ["fig9"], 1)
 
 
 def test_the_reference_holds_what_is_small_and_is_compared_with(here, monkeypatch, capsys):
@@ -311,7 +317,8 @@ def test_the_reference_holds_what_is_small_and_is_compared_with(here, monkeypatc
     folder = here.project / "results/reference"
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert names == {
-        "SHA256SUMS", "archive.json", "claims.csv", "figures/fig1.png", "left-out.csv", "tables/fig1.csv",
+        "SHA256SUMS", "archive.json", "claims.csv", "claims.json", "claims.md", "figures/fig1.png",
+        "left-out.csv", "tables/fig1.csv",
     }  # fmt: skip
     before = {name: (folder / name).read_bytes() for name in names}
     assert cli.main(["reference"]) == 0
@@ -382,11 +389,12 @@ def test_the_crate_describes_every_file_and_the_run(packed):
     assert {part["@id"] for part in root["hasPart"]} == files
     assert root["mentions"] == {"@id": "#run"} and root["mainEntity"] == run["instrument"]
     assert {it["@id"] for it in run["result"]} == {
-        "figures/fig1.pdf", "figures/fig1.png", "results/claims.csv", "results/tables/fig1.csv",
+        "figures/fig1.pdf", "figures/fig1.png", "results/claims.csv", "results/claims.json",
+        "results/claims.md", "results/final.sha256", "results/tables/fig1.csv",
         "results/views/still.sha256",
     }  # fmt: skip
     assert {it["@id"] for it in run["object"]} == {
-        "config/config.yaml", "config/scene.txt", "environment.lock",
+        "config/claims.yaml", "config/config.yaml", "config/scene.txt", "environment.lock",
     }  # fmt: skip
     for entity in crate["@graph"]:  # whatever is referred to is described, or is a web page
         for value in entity.values():
@@ -402,10 +410,10 @@ def test_the_real_study_is_finished_without_its_intermediate_files(touched, tmp_
     left_out = {output.rule for output in contents.left_out}
     assert left_out >= {"simulate", "detect", "detect_stored", "scale_space", "match_samplings"}
     assert not left_out & {"fig5", "score_features", "claims"}
-    with verification.unpacked(archive.pack(study, tmp_path / "quick.zip")) as folder:
-        about = verification.read_about(folder)
-        assert not (folder / "results/quick/keypoints").exists()
-        check = verification._check_nothing_to_do(folder, about, touched.folder)
+    with unpacked(archive.pack(study, tmp_path / "quick.zip")) as held:
+        assert not (held.folder / "results/quick/keypoints").exists()
+        run = verification._run_of(held)
+        check = verification.check_nothing_to_do(held, run, touched.folder)
     assert check.problems == []
 
 

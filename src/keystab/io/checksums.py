@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from keystab.errors import InputError
 from keystab.utils.files import written_whole
 
-__all__ = ["seal", "verify", "write_seal"]
+__all__ = ["list_of_files", "read_sums", "seal", "verify", "write_seal"]
 
 
 def seal(path: str | os.PathLike[str]) -> str:
@@ -38,6 +39,36 @@ def seal(path: str | os.PathLike[str]) -> str:
     if not lines:
         raise InputError(f"{path}: no folder with files that could be sealed")
     return "".join(lines)
+
+
+def list_of_files(paths: Iterable[str | os.PathLike[str]]) -> str:
+    """List the digests of files, one line each, in the format of ``sha256sum``.
+
+    The same files give the same text, in whatever order they come.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Files; they are named as given.
+
+    Returns
+    -------
+    str
+        Lines of 64 hexadecimal digits, two spaces and a path, in the order of the paths.
+    """
+    return "".join(f"{_digest(path)}  {path.as_posix()}\n" for path in sorted(map(Path, paths)))
+
+
+def read_sums(text: str) -> dict[str, str]:
+    r"""Digests by file name, from a list as ``sha256sum`` writes it.
+
+    Examples
+    --------
+    >>> read_sums("ab  one.csv\n")
+    {'one.csv': 'ab'}
+    """
+    lines = (line.partition("  ") for line in text.split("\n"))
+    return {name: digest for digest, _, name in lines if name}
 
 
 def write_seal(path: str | os.PathLike[str], seal_path: str | os.PathLike[str]) -> None:
@@ -77,10 +108,9 @@ def verify(path: str | os.PathLike[str], seal_path: str | os.PathLike[str]) -> N
         seal.
     """
     try:
-        lines = Path(seal_path).read_text(encoding="utf-8").splitlines()
+        sealed = read_sums(Path(seal_path).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         raise InputError(f"{seal_path}: no readable seal; make the store again") from None
-    sealed = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
     found = _digests(Path(path))
     problems = [f"{name} is missing" for name in sealed if name not in found]
     problems += [
@@ -100,6 +130,10 @@ def _digests(folder: Path) -> dict[str, str]:
     digests = {}
     for name in names:
         if not any(part.startswith(".") for part in name.split("/")):
-            with (folder / name).open("rb") as file:
-                digests[name] = hashlib.file_digest(file, "sha256").hexdigest()
+            digests[name] = _digest(folder / name)
     return digests
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

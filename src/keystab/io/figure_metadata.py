@@ -23,6 +23,8 @@ PNG_KEY = "keystab"
 """Text chunk of a PNG that holds the passport; a PDF has it in ``/Keywords`` of its ``/Info``."""
 
 _DIGEST = re.compile("[0-9a-f]{64}")
+_NAME = re.compile(r"[A-Za-z0-9]\w*", re.ASCII)
+_FILE = re.compile(r"\w[\w.+-]*")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,12 +86,16 @@ class Passport:
             fields = json.loads(text)
             config = fields.pop("config")
             passport = cls(**fields)
+            # Names become paths: a stranger's must not lead elsewhere.
             sound = (
                 isinstance(passport.settings, dict)
+                and _NAME.fullmatch(passport.figure)
+                and isinstance(passport.version, str)
+                and all(map(_FILE.fullmatch, passport.tables))
                 and all(map(_DIGEST.fullmatch, passport.tables.values()))
                 and all(_DIGEST.fullmatch(it) for it in (passport.code, passport.lock) if it)
             )
-        except (ValueError, TypeError, AttributeError, KeyError):
+        except (ValueError, TypeError, AttributeError, KeyError, RecursionError):
             raise InputError("no passport of keystab") from None
         if not sound or config != passport.config:
             raise InputError("its passport was changed by hand or damaged")

@@ -15,7 +15,8 @@ import json
 import platform
 import stat
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
@@ -23,16 +24,20 @@ from keystab import __version__
 from keystab.errors import InputError
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.ro_crate import Item, crate_text
+from keystab.provenance.run_description import (
+    ABOUT,
+    LEFT_OUT,
+    SUMS,
+    About,
+    arithmetic,
+    folder_problem,
+)
 from keystab.provenance.snakemake_records import FOLDER, Record, read_records
 from keystab.provenance.study_folder import Output, Study
 from keystab.utils.files import written_whole
 from keystab.utils.memory import in_words
 
-__all__ = ["ABOUT", "LEFT_OUT", "SUMS", "Contents", "arithmetic", "pack", "publish", "read_sums"]
-
-ABOUT = "archive.json"
-SUMS = "SHA256SUMS"
-LEFT_OUT = "left-out.csv"
+__all__ = ["Contents", "about_study", "is_final", "pack", "publish"]
 
 _SOURCES = (
     "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "DEVIATIONS.md", "LICENSE", "Makefile",
@@ -99,11 +104,15 @@ class Contents:
         return datetime.fromtimestamp(last, UTC).date().isoformat()
 
 
+def is_final(path: str, study: Study) -> bool:
+    """Whether an output is one that the study ends in: a figure, a table or the verdicts."""
+    verdicts = PurePosixPath(path).parent.as_posix() == study.results
+    return verdicts or path.startswith((f"{study.results}/tables/", f"{study.figures}/"))
+
+
 def _is_kept(path: str, study: Study) -> bool:
     """Whether an output goes into the archive; the others are big and made again by the study."""
-    tables = f"{study.results}/tables/"
-    verdicts = PurePosixPath(path).parent.as_posix() == study.results
-    return path.startswith((tables, f"{study.figures}/")) or path.endswith(".sha256") or verdicts
+    return is_final(path, study) or path.endswith(".sha256")
 
 
 def pack(study: Study, path: Path | None = None) -> Path:
@@ -125,6 +134,11 @@ def pack(study: Study, path: Path | None = None) -> Path:
     InputError
         If the run is not finished.
     """
+    for key in ("results", "figures", "logs"):
+        if problem := folder_problem(getattr(study, key)):
+            raise InputError(
+                f"{key} is {getattr(study, key)}, which {problem}: an archive is unpacked elsewhere"
+            )
     contents = Contents.of(study)
     members = dict(_members(contents))
     members[LEFT_OUT] = _listed(contents.left_out, contents).encode()
@@ -189,37 +203,27 @@ def publish(study: Study, folder: Path | None = None) -> Path:
 
 def _about(contents: Contents) -> bytes:
     """What the run was made by: versions, digests of lock and settings, and the machine."""
-    study = contents.study
     fields = {
-        "keystab": __version__,
-        "lock": study.lock_digest,
-        "settings": study.settings_digest,
-        "overlays": [_overlay(number, path) for number, path in enumerate(study.overlays, 1)],
-        "results": study.results,
-        "figures": study.figures,
-        "logs": study.logs,
+        **dataclasses.asdict(about_study(contents.study)),
         "finished": contents.date,
         "python": platform.python_version(),
-        "arithmetic": arithmetic(),
     }
     return (json.dumps(fields, indent=1, sort_keys=True) + "\n").encode()
 
 
-def arithmetic() -> str:
-    """What the last digits of results depend on: the processor as numpy and its BLAS see it.
-
-    Two machines of which this is the same run the same instructions.
-    """
-    import numpy as np
-    import threadpoolctl
-
-    blas = {
-        str(library.get("architecture"))
-        for library in threadpoolctl.threadpool_info()
-        if library["user_api"] == "blas"
-    }
-    simd = np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", [])
-    return " ".join([platform.system(), platform.machine(), *sorted(blas), *sorted(simd)])
+def about_study(study: Study) -> About:
+    """What a run here and now says of itself."""
+    return About(
+        keystab=__version__,
+        lock=study.lock_digest,
+        settings=study.settings_digest,
+        overlays=tuple(_overlay(number, path) for number, path in enumerate(study.overlays, 1)),
+        results=study.results,
+        figures=study.figures,
+        logs=study.logs,
+        arithmetic=arithmetic(),
+        zlib=zlib.ZLIB_RUNTIME_VERSION,
+    )
 
 
 def _members(contents: Contents) -> Iterator[tuple[str, bytes]]:
@@ -408,15 +412,3 @@ def _sums(files: Mapping[str, bytes]) -> bytes:
         f"{hashlib.sha256(data).hexdigest()}  {name}\n" for name, data in sorted(files.items())
     ]
     return "".join(lines).encode()
-
-
-def read_sums(text: str) -> dict[str, str]:
-    r"""Digests by file name, from a list as ``sha256sum`` writes it.
-
-    Examples
-    --------
-    >>> read_sums("ab  one.csv\n")
-    {'one.csv': 'ab'}
-    """
-    lines: Sequence[str] = text.splitlines()
-    return {name: digest for digest, _, name in (line.partition("  ") for line in lines) if name}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import re
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -16,15 +18,21 @@ from keystab.provenance.snakemake_records import Record, read_records, settings_
 __all__ = ["code_of_figure", "file_digest", "read_passport", "whence"]
 
 _SHORT = 12
+_MOST_PIXELS = 100_000_000
+_ESCAPE = re.compile(rb"\\([0-7]{1,3}|.)", re.DOTALL)
+_KEYWORDS = re.compile(rb"/Keywords \(((?:[^()\\]|\\.)*)\)", re.DOTALL)
 
 
-def read_passport(path: Path | str) -> Passport:
+def read_passport(path: Path | str, as_drawn: bool = False) -> Passport:
     """Read the passport of a figure.
 
     Parameters
     ----------
     path : path
         A PDF or PNG; what it is, its content says, not its ending.
+    as_drawn : bool, optional
+        Read a passport only where the study writes it. Nothing is then decoded, so that a figure
+        that a stranger made can neither fill the memory nor take long.
 
     Raises
     ------
@@ -40,9 +48,9 @@ def read_passport(path: Path | str) -> Passport:
     except IsADirectoryError:
         raise InputError(f"{path} is a folder; give a figure, as PDF or PNG") from None
     if start.startswith(b"%PDF"):
-        text = _text_of_pdf(path)
+        text = _text_of_pdf(path, as_drawn)
     elif start == b"\x89PNG\r\n\x1a\n":
-        text = _text_of_png(path)
+        text = _text_of_png(path, as_drawn)
     else:
         raise InputError(f"{path}: neither a PDF nor a PNG; give a figure of the study")
     if text is None:
@@ -55,26 +63,36 @@ def read_passport(path: Path | str) -> Passport:
         raise InputError(f"{path}: {error}; draw it again") from None
 
 
-def _text_of_pdf(path: Path) -> str | None:
+def _text_of_pdf(path: Path, as_drawn: bool) -> str | None:
+    if as_drawn:
+        found = _KEYWORDS.search(path.read_bytes())
+        return _ESCAPE.sub(_unescaped, found[1]).decode("latin-1") if found else None
     from pypdf import PdfReader
     from pypdf.errors import PyPdfError
 
     try:
         about = PdfReader(path).metadata
-        found = about.get("/Keywords") if about else None
+        keywords = about.get("/Keywords") if about else None
     except (PyPdfError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise InputError(f"{path}: a damaged PDF; draw it again") from None
-    return None if found is None else str(found)
+    return None if keywords is None else str(keywords)
 
 
-def _text_of_png(path: Path) -> str | None:
+def _unescaped(found: re.Match[bytes]) -> bytes:
+    """One escape of a text in a PDF: a byte by its octal number, or the byte itself."""
+    return bytes([int(found[1], 8) & 0xFF]) if found[1].isdigit() else found[1]
+
+
+def _text_of_png(path: Path, as_drawn: bool) -> str | None:
     from PIL import Image
 
     try:
-        with Image.open(path) as picture:
-            picture.load()
+        # Opening reads what stands before the pixels; what stands behind needs these decoded.
+        with warnings.catch_warnings(action="ignore"), Image.open(path) as picture:
+            if not as_drawn and picture.width * picture.height <= _MOST_PIXELS:
+                picture.load()
             found = picture.info.get(PNG_KEY)
-    except (OSError, SyntaxError, ValueError):
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
         raise InputError(f"{path}: a damaged PNG; draw it again") from None
     return found if found is None else str(found)
 

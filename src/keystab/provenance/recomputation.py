@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-import csv
-import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from keystab.errors import InputError
+from keystab.io.checksums import read_sums
 from keystab.provenance import table_differences
-from keystab.provenance.archive import read_sums
+from keystab.provenance.archived_settings import place_settings
 from keystab.provenance.lineage import file_digest
-from keystab.provenance.snakemake_records import Record, read_records
-from keystab.provenance.study_folder import Study
-from keystab.provenance.verification import (
+from keystab.provenance.result_checks import (
     Check,
     alike,
     compare_tables,
-    copy_workflow,
     left_out_digests,
-    read_about,
+    verdicts_in,
 )
+from keystab.provenance.run_description import About
+from keystab.provenance.snakemake_records import Record, read_records
+from keystab.provenance.study_folder import Study
+from keystab.provenance.unpacking import Unpacked
+from keystab.provenance.verification import copy_workflow
 
 __all__ = ["recompute"]
 
 
 def recompute(
-    source: Path,
+    held: Unpacked,
     project: Path,
     targets: Sequence[str],
     cores: int,
@@ -37,10 +37,13 @@ def recompute(
 ) -> tuple[list[Check], bool]:
     """Compute figures again from the picture on and compare with a run.
 
+    The code is that of the project; of the run, which may be a stranger's, settings and pictures
+    are used as data. All that is written lies in a temporary folder.
+
     Parameters
     ----------
-    source : path
-        The run: an unpacked archive, or the folder of the reference.
+    held : Unpacked
+        The run: an archive that was taken apart and checked, or the committed reference.
     project : path
         Copy of the project whose code, settings and lock are used.
     targets : sequence of str
@@ -62,14 +65,12 @@ def recompute(
     InputError
         If a figure is none of the study, or a job fails.
     """
-    about = read_about(source)
+    source, about = held.folder, held.about
     everything = list(targets) == ["all"]
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
         copy_workflow(project, scratch)
-        if (source / "settings").is_dir():
-            shutil.copytree(source / "settings", scratch / "settings")
-        study = Study(scratch, about["overlays"])
+        study = Study(scratch, place_settings(held, project, scratch))
         drawn = [
             f"{study.figures}/{target}.{kind}" for target in targets for kind in ("pdf", "png")
         ]
@@ -96,10 +97,10 @@ def recompute(
 
 
 def _compare_figures(
-    source: Path, study: Study, records: Mapping[str, Record], about: Mapping[str, Any]
+    source: Path, study: Study, records: Mapping[str, Record], about: About
 ) -> Check:
     """Compare drawn figures byte by byte; they carry the digests of their tables."""
-    inside = source / about["figures"]
+    inside = source / about.figures
     inside = inside if inside.is_dir() else source / "figures"
     paths = [path for path in records if path.startswith(f"{study.figures}/")]
     paths = [path for path in paths if (inside / PurePosixPath(path).name).is_file()]
@@ -113,11 +114,11 @@ def _compare_figures(
     return Check("figures", words, told if same_machine else [], [] if same_machine else told)
 
 
-def _compare_verdicts(source: Path, found: Path, about: Mapping[str, Any]) -> Check:
+def _compare_verdicts(source: Path, found: Path, about: About) -> Check:
     """Compare the verdicts on claims."""
     path = source / "claims.csv"
-    path = path if path.is_file() else source / about["results"] / "claims.csv"
-    before, after = _verdicts(path), _verdicts(found / "claims.csv")
+    path = path if path.is_file() else source / about.results / "claims.csv"
+    before, after = verdicts_in(path), verdicts_in(found / "claims.csv")
     problems = [
         f"{name}: {before.get(name, 'no verdict')} became {after.get(name, 'no verdict')}"
         for name in sorted(before.keys() | after.keys())
@@ -126,14 +127,8 @@ def _compare_verdicts(source: Path, found: Path, about: Mapping[str, Any]) -> Ch
     return Check("claims", f"{len(before)} verdicts the same", problems)
 
 
-def _verdicts(path: Path) -> dict[str, str]:
-    with path.open(newline="", encoding="utf-8") as lines:
-        rows = list(csv.DictReader(lines))
-    return {row["id"]: row["verdict"] for row in rows}
-
-
 def _compare_left_out(
-    source: Path, study: Study, records: Mapping[str, Record], about: Mapping[str, Any]
+    source: Path, study: Study, records: Mapping[str, Record], about: About
 ) -> Check:
     """Compare files that were left out with the digests that were not."""
     digests = left_out_digests(source)

@@ -16,10 +16,32 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-__all__ = ["FOLDER", "Record", "read_records", "settings_behind", "upstream"]
+from keystab.errors import InputError
+
+__all__ = [
+    "FOLDER",
+    "Record",
+    "place_records",
+    "read_foreign_records",
+    "read_records",
+    "settings_behind",
+    "upstream",
+]
 
 FOLDER = Path(".snakemake/metadata")
 """Where the records lie, within the project's folder."""
+
+_MOST_BYTES = 5_000_000
+_TEXT_OR_NONE, _NUMBER_OR_NONE = (str, type(None)), (int, float, type(None))
+_TYPES: Mapping[str, tuple[type, ...]] = {
+    "rule": (str,), "input": (list,), "log": (list,), "shellcmd": _TEXT_OR_NONE,
+    "params": (list,), "code": _TEXT_OR_NONE, "record_format_version": (int,),
+    "conda_env": _TEXT_OR_NONE, "container_img_url": _TEXT_OR_NONE,
+    "software_stack_hash": _TEXT_OR_NONE, "job_hash": (int,), "starttime": _NUMBER_OR_NONE,
+    "endtime": _NUMBER_OR_NONE, "incomplete": (bool,), "external_jobid": (type(None),),
+    "input_checksums": (dict, type(None)),
+}  # fmt: skip
+"""What Snakemake writes, and as what; of a stranger's record nothing else is kept."""
 
 _SETTING = re.compile(r"([a-z][\w.]*) = (.*)", re.DOTALL)
 
@@ -107,20 +129,90 @@ def read_records(project: Path) -> dict[str, Record]:
     return dict(sorted(records.items()))
 
 
+def read_foreign_records(folder: Path, results: Iterable[str]) -> dict[str, Record]:
+    """Read the records of an archive that a stranger made, by the path of their output.
+
+    Parameters
+    ----------
+    folder : path
+        Where the archive was unpacked.
+    results : iterable of str
+        Folders that its run wrote to, relative and checked; outputs lie in one of them.
+
+    Raises
+    ------
+    InputError
+        In one line, if one of them is not as Snakemake writes it, is of a file outside the folders
+        of results, or names an input outside the project.
+    """
+    places = tuple(f"{place}/" for place in results)
+    records: dict[str, Record] = {}
+    for file in sorted((folder / FOLDER).rglob("*")):
+        if not file.is_file():
+            continue
+        path = file.relative_to(folder / FOLDER).as_posix()
+        name = f"{FOLDER.as_posix()}/{path[:60]}"
+        if file.stat().st_size > _MOST_BYTES:
+            raise InputError(f"{name}: too long for a record of Snakemake")
+        try:
+            output = base64.b64decode(
+                re.sub("[@/]", "", path).encode("ascii"), altchars=b"-_", validate=True
+            ).decode("utf-8")
+            fields = json.loads(file.read_text(encoding="utf-8"))
+            kept = {key: fields[key] for key in _TYPES}
+        except (ValueError, KeyError, TypeError, RecursionError):
+            raise InputError(f"{name}: not a record of Snakemake") from None
+        checksums = kept["input_checksums"] or {}
+        texts = [*kept["params"], *kept["log"]] if _typed(kept) else [None]
+        if not all(isinstance(it, str) for it in (*texts, *kept["input"], *checksums.values())):
+            raise InputError(f"{name}: not a record of Snakemake")
+        if not output.startswith(places) or _leads_out(output) or output in records:
+            raise InputError(f"{name}: records {output[:80]!a}, which is no result of this run")
+        if outside := [it for it in (*kept["input"], *checksums) if _leads_out(it)]:
+            raise InputError(
+                f"{output}: was made from {outside[0][:80]!a}, a file outside the project, which "
+                "cannot be checked; pictures belong into config/images"
+            )
+        records[output] = Record(output, path, kept)
+    return dict(sorted(records.items()))
+
+
+def place_records(records: Mapping[str, Record], project: Path) -> None:
+    """Write records where Snakemake looks for them in a project."""
+    for record in records.values():
+        path = project / FOLDER / record.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(record.fields), encoding="utf-8")
+
+
+def _typed(fields: Mapping[str, Any]) -> bool:
+    """Whether the fields of a record have the types that Snakemake gives them."""
+    return not fields["incomplete"] and all(
+        isinstance(fields[key], kinds) and isinstance(fields[key], bool) == (bool in kinds)
+        for key, kinds in _TYPES.items()
+    )
+
+
+def _leads_out(path: str) -> bool:
+    """Whether a path is not one of a file below the project's folder."""
+    parts = path.split("/")
+    return not path.isprintable() or any(part in ("", ".", "..", "~") for part in parts)
+
+
 def upstream(records: Mapping[str, Record], outputs: Iterable[str]) -> list[Record]:
     """Records of some files and of all that these were made from, each after its inputs' records.
 
     Files without a record, such as the reference picture, are no part of it.
     """
     found: dict[str, Record] = {}
+    opened: set[str] = set()  # a record that somebody forged may be behind itself
     waiting = [(output, False) for output in sorted(outputs, reverse=True)]
     while waiting:
         output, inputs_done = waiting.pop()
-        if output in found or output not in records:
-            continue
         if inputs_done:
             found[output] = records[output]
-        else:
+        elif output in records and output not in opened:
+            opened.add(output)
             waiting.append((output, True))
             waiting.extend((name, False) for name in sorted(records[output].inputs, reverse=True))
     return list(found.values())

@@ -48,6 +48,8 @@ class Study:
         Folder that holds the Snakefile.
     overlays : sequence of path
         Files of settings; later ones win. They are relative to the project unless absolute.
+    most_seconds : float, optional
+        Longest time that Snakemake may take to plan; without end by default.
 
     Raises
     ------
@@ -55,8 +57,14 @@ class Study:
         If the folder is no project, or the settings cannot work.
     """
 
-    def __init__(self, project: Path, overlays: Sequence[Path | str] = ()) -> None:
+    def __init__(
+        self,
+        project: Path,
+        overlays: Sequence[Path | str] = (),
+        most_seconds: float | None = None,
+    ) -> None:
         self.project = Path(project)
+        self.most_seconds = most_seconds
         self.overlays = [Path(overlay) for overlay in overlays]
         if not (self.project / "Snakefile").is_file():
             raise InputError(f"{project}: no Snakefile there; go to the project's folder")
@@ -100,7 +108,11 @@ class Study:
         return sorted(outputs, key=lambda output: output.path)
 
     def to_do(self, *targets: str) -> list[str]:
-        """What Snakemake would run of its own accord, with the reasons; empty where all is done.
+        """What Snakemake would run of its own accord, one line each; see `plan`."""
+        return [f"{job}: {reason}" if reason else job for job, reason in self.plan(*targets)]
+
+    def plan(self, *targets: str) -> list[tuple[str, str]]:
+        """Jobs that Snakemake would run of its own accord, with reasons; none where all is done.
 
         Jobs that would only follow others, or only make again what others need, are not named.
 
@@ -119,8 +131,8 @@ class Study:
         }
         jobs = {job: why for job, why in own.items() if why} or dict(found)
         shortened = {job: _LONG.sub("", why).strip() for job, why in jobs.items()}
-        told = [f"{job}: {_DIGEST.sub('code or lock', why)}" for job, why in shortened.items()]
-        return told or ["jobs that snakemake --dry-run names"]
+        told = [(job, _DIGEST.sub("code or lock", why)) for job, why in shortened.items()]
+        return told or [("jobs that snakemake --dry-run names", "")]
 
     def run(self, cores: int, *targets: str) -> None:
         """Make targets, or the whole study, showing what Snakemake says.
@@ -146,9 +158,19 @@ class Study:
         flags = [argument for argument in arguments if argument.startswith("-")]
         targets = [argument for argument in arguments if not argument.startswith("-")]
         command = [*self._command(), "--cores", "1", *flags, *self._files(), "--", *targets]
-        run = subprocess.run(
-            command, cwd=self.project, env=_environment(), capture_output=True, text=True
-        )
+        try:
+            run = subprocess.run(
+                command,
+                cwd=self.project,
+                env=_environment(),
+                capture_output=True,
+                text=True,
+                timeout=self.most_seconds,
+            )
+        except subprocess.TimeoutExpired:
+            raise InputError(
+                f"snakemake does not plan these settings within {self.most_seconds:.0f} seconds"
+            ) from None
         if run.returncode:
             lines = (run.stdout + run.stderr).strip().splitlines() or ["it says nothing"]
             raise InputError(f"snakemake {' '.join(arguments)} failed: {lines[-1].strip()}")

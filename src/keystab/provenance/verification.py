@@ -1,75 +1,59 @@
-"""Check an archive, the committed reference or the results that are here, computing nothing.
+"""Check an archive, or the results that are here, computing nothing but verdicts.
 
 Each check answers with one line, and names what does not hold. Nothing of the project's own results
-is touched: archives are unpacked in temporary folders.
+is touched, and nothing of an archive is run: it is taken apart as data in a temporary folder, where
+the rules and the code are those that are here. What this proves, and against whom, says
+REPRODUCING.md.
 """
 
 from __future__ import annotations
 
-import contextlib
-import csv
-import dataclasses
-import json
 import os
 import shutil
 import tempfile
 import time
-import zipfile
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path, PurePosixPath
-from typing import Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from keystab.errors import InputError
+from keystab.io.checksums import read_sums
 from keystab.io.checksums import verify as verify_seal
-from keystab.provenance import table_differences
-from keystab.provenance.archive import ABOUT, LEFT_OUT, SUMS, arithmetic, read_sums
-from keystab.provenance.lineage import code_of_figure, file_digest, read_passport
-from keystab.provenance.snakemake_records import Record, read_records, upstream
+from keystab.provenance.archive import about_study, is_final
+from keystab.provenance.archived_settings import place_settings
+from keystab.provenance.lineage import file_digest
+from keystab.provenance.result_checks import (
+    Check,
+    Run,
+    alike,
+    check_columns,
+    check_figures,
+    check_final,
+    check_reference,
+    check_verdicts,
+    left_out_digests,
+)
+from keystab.provenance.run_description import ABOUT, LEFT_OUT, SUMS
+from keystab.provenance.snakemake_records import (
+    Record,
+    place_records,
+    read_foreign_records,
+    read_records,
+    upstream,
+)
 from keystab.provenance.study_folder import Study
+from keystab.provenance.unpacking import Unpacked, unpacked
 
-__all__ = [
-    "Check",
-    "alike",
-    "check_archive",
-    "check_digests",
-    "check_here",
-    "compare_tables",
-    "copy_workflow",
-    "left_out_digests",
-    "read_about",
-    "report",
-    "require_archive",
-    "unpacked",
-]
+__all__ = ["check_archive", "check_here", "check_reference_itself", "copy_workflow", "report"]
 
 _MOST_NAMED = 10
 _WORKFLOW = ("Snakefile", "environment.lock", "workflow", "profiles", "config")
-
-
-@dataclasses.dataclass(frozen=True)
-class Check:
-    """Answer to one question.
-
-    Parameters
-    ----------
-    what : str
-        What was asked, in a word or two.
-    words : str
-        The answer, if all is well.
-    problems : list of str
-        What does not hold, one line each.
-    notes : list of str
-        What a reader should know although it harms nothing.
-    """
-
-    what: str
-    words: str
-    problems: list[str] = dataclasses.field(default_factory=list)
-    notes: list[str] = dataclasses.field(default_factory=list)
+_MOST_SECONDS = 120.0
 
 
 def report(checks: Sequence[Check]) -> str:
     """Write the answers for people, problems first said and then named.
+
+    Text that a stranger wrote is shown without what a terminal would obey.
 
     Examples
     --------
@@ -89,54 +73,15 @@ def report(checks: Sequence[Check]) -> str:
         lines += [f"          {problem}" for problem in shown]
         lines += [f"          and {more} more"] * (more > 0)
         lines += [f"          note: {note}" for note in check.notes]
-    return "\n".join(lines)
+    return "\n".join(map(_harmless, lines))
 
 
-def require_archive(path: Path) -> None:
-    """Raise `InputError` where there is no such file."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; make archive writes one")
-
-
-@contextlib.contextmanager
-def unpacked(archive: Path) -> Iterator[Path]:
-    """Unpack an archive into a temporary folder for as long as a block runs.
-
-    Raises
-    ------
-    InputError
-        If it is no archive of this study, or holds paths that lead out of its folder.
-    """
-    require_archive(archive)
-    try:
-        with zipfile.ZipFile(archive) as file, tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            for member in file.infolist():
-                path = PurePosixPath(member.filename)
-                if path.is_absolute() or ".." in path.parts or "\\" in member.filename:
-                    raise InputError(f"{archive}: {member.filename} leads out of its folder")
-                target = folder / path
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(_bytes_of(file, member))
-            if not (folder / ABOUT).is_file() or not (folder / SUMS).is_file():
-                raise InputError(f"{archive}: no archive of this study; make archive writes one")
-            yield folder
-    except (zipfile.BadZipFile, OSError) as error:
-        if isinstance(error, OSError) and error.errno is not None:
-            raise
-        raise InputError(f"{archive}: not a whole zip file; get it again") from None
-
-
-def _bytes_of(file: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
-    """Read a member; nothing where it is damaged, so that its digest tells, by its name."""
-    try:
-        return file.read(member)
-    except zipfile.BadZipFile:
-        return b""
+def _harmless(line: str) -> str:
+    return "".join(it if it.isprintable() else "?" for it in line)
 
 
 def check_archive(archive: Path, project: Path) -> tuple[list[Check], bool]:
-    """Check an archive against a copy of the project, without computing anything.
+    """Check an archive against a copy of the project, without computing anything but verdicts.
 
     Parameters
     ----------
@@ -154,104 +99,90 @@ def check_archive(archive: Path, project: Path) -> tuple[list[Check], bool]:
     Raises
     ------
     InputError
-        If it is no archive of this study.
+        If it is no archive of this study and version, or not one that `pack` writes.
     """
-    with unpacked(archive) as folder:
-        about = read_about(folder)
-        checks = [
-            check_digests(folder),
-            _check_sources(folder, project),
-            _check_figures(folder, about, project),
-            _check_inputs(read_records(folder), folder, left_out_digests(folder)),
-            _check_nothing_to_do(folder, about, project),
-        ]
+    with unpacked(archive) as held:
+        try:
+            run = _run_of(held)
+            lock = file_digest(project / "environment.lock")
+            checks = [
+                check_digests(_listed(held.folder), held.digests),
+                _check_sources(held, project),
+                check_final(run),
+                check_figures(run, lock),
+                check_inputs(run, {**left_out_digests(held.folder), **held.digests}),
+                check_columns(run),
+                check_verdicts(run, project / "config/claims.yaml", alike(run.about, lock)),
+                *check_reference(run, project / "results/reference", lock),
+                check_nothing_to_do(held, run, project),
+            ]
+        except InputError as error:
+            raise InputError(f"{archive}: {error}") from None
     return checks, not any(check.problems for check in checks)
 
 
-def read_about(folder: Path) -> Mapping[str, Any]:
-    """Read what a run says about itself.
+def _run_of(held: Unpacked) -> Run:
+    """The run that an archive holds; its records were checked one by one."""
+    about = held.about
+    places = (about.results, about.figures)
+    return Run(held.folder, about, read_foreign_records(held.folder, places))
 
-    Raises
-    ------
-    InputError
-        If it does not say it.
-    """
+
+def _listed(folder: Path) -> dict[str, str]:
     try:
-        about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
-        _ = [about[key] for key in ("lock", "settings", "overlays", "results", "figures", "logs")]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(
-            f"{folder / ABOUT}: no such file, or it says nothing about a run; make reference or "
-            "make archive writes it"
-        ) from None
-    return about
+        return read_sums((folder / SUMS).read_text(encoding="utf-8"))
+    except UnicodeError:
+        raise InputError(f"{SUMS} is no list of digests; get it again") from None
 
 
-def check_digests(folder: Path) -> Check:
-    """Hold every file of a folder against the list of digests that lies in it."""
-    sums = read_sums((folder / SUMS).read_text(encoding="utf-8"))
-    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    problems = [f"{name}: missing" for name in sorted(sums.keys() - there)]
+def check_digests(listed: Mapping[str, str], found: Mapping[str, str]) -> Check:
+    """Hold files against the list of digests that lies beside them.
+
+    Parameters
+    ----------
+    listed, found : mapping from str to str
+        SHA-256 by name: as listed, and as they are; empty for a damaged file.
+    """
+    problems = [f"{name}: missing" for name in sorted(listed.keys() - found.keys())]
     problems += [
         f"{name}: damaged or changed"
-        for name in sorted(sums.keys() & there)
-        if file_digest(folder / name) != sums[name]
+        for name in sorted(listed.keys() & found.keys())
+        if found[name] != listed[name]
     ]
-    problems += [f"{name}: not in {SUMS}" for name in sorted(there - sums.keys() - {SUMS})]
-    return Check("digests", f"{len(sums)} files as listed in {SUMS}", problems)
+    problems += [f"{name}: not in {SUMS}" for name in sorted(found.keys() - listed.keys() - {SUMS})]
+    return Check("digests", f"{len(listed)} files as listed in {SUMS}", problems)
 
 
-def _check_sources(folder: Path, project: Path) -> Check:
-    """Say which sources differ; whether that matters, Snakemake says."""
-    names = [
-        path.relative_to(folder)
-        for part in ("src", *_WORKFLOW)
-        for path in ([folder / part] if (folder / part).is_file() else (folder / part).rglob("*"))
+def check_reference_itself(reference: Path) -> Check:
+    """Hold the files of the committed reference against its own list of digests."""
+    found = {
+        path.relative_to(reference).as_posix(): file_digest(path)
+        for path in reference.rglob("*")
         if path.is_file()
-    ]
+    }
+    return check_digests(_listed(reference), found)
+
+
+def _check_sources(held: Unpacked, project: Path) -> Check:
+    """Say which sources differ; whether that matters, Snakemake says."""
+    names = sorted(name for name in held.digests if name.split("/")[0] in ("src", *_WORKFLOW))
     other = [
-        name.as_posix()
-        for name in sorted(names)
-        if not (project / name).is_file()
-        or (project / name).read_bytes() != (folder / name).read_bytes()
+        name
+        for name in names
+        if not (project / name).is_file() or file_digest(project / name) != held.digests[name]
     ]
     words = f"{len(names) - len(other)} of {len(names)} files of code and settings are those here"
     named = ", ".join(other[:_MOST_NAMED]) + (" and more" if len(other) > _MOST_NAMED else "")
-    told = f"not the same here: {named}; whether it matters, the next lines say"
-    return Check("sources", words, notes=[told] if other else [])
+    told = [f"not the same here: {named}; whether it matters, the next lines say"] * bool(other)
+    told += [
+        f"{name}: a page that nothing checks; opened in a browser, it can run what its writer wants"
+        for name in sorted(held.digests)
+        if name.endswith(".html")
+    ]
+    return Check("sources", words, notes=told)
 
 
-def _check_figures(folder: Path, about: Mapping[str, Any], project: Path) -> Check:
-    """Hold each passport against the tables beside its figure, and the code and lock here."""
-    figures = sorted((folder / about["figures"]).glob("*.p[dn][fg]"))
-    lock = file_digest(project / "environment.lock")
-    problems = [] if figures else [f"{about['figures']}: holds no figures"]
-    code: dict[str, str | None] = {}
-    tables = set()
-    for path in figures:
-        name = path.relative_to(folder).as_posix()
-        try:
-            passport = read_passport(path)
-        except InputError as error:
-            problems.append(f"{name}{str(error).removeprefix(str(path))}")
-            continue
-        if passport.figure not in code:
-            code[passport.figure] = code_of_figure(passport.figure)
-        if passport.code != code[passport.figure]:
-            problems.append(f"{name}: drawn by other code than is here")
-        if passport.lock != lock:
-            problems.append(f"{name}: drawn under another environment.lock than is here")
-        for table, digest in passport.tables.items():
-            found = folder / about["results"] / "tables" / table
-            tables.add(table)
-            if not found.is_file() or file_digest(found) != digest:
-                state = "changed" if found.is_file() else "missing"
-                problems.append(f"{name}: drawn from another {table} than the one here ({state})")
-    words = f"{len(figures)} drawn from the {len(tables)} tables here, by this code and lock"
-    return Check("figures", words, problems)
-
-
-def _check_nothing_to_do(folder: Path, about: Mapping[str, Any], project: Path) -> Check:
+def check_nothing_to_do(held: Unpacked, run: Run, project: Path) -> Check:
     """Ask Snakemake, in a copy of the project's workflow with the archive's results, what to run.
 
     Every file is made to look newer than what was made of it, so that Snakemake trusts no times: it
@@ -261,15 +192,17 @@ def _check_nothing_to_do(folder: Path, about: Mapping[str, Any], project: Path) 
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
         copy_workflow(project, scratch)
-        for part in (about["results"], about["figures"], ".snakemake/metadata", "settings"):
-            if (folder / part).is_dir():
-                shutil.copytree(folder / part, scratch / part, dirs_exist_ok=True)
+        overlays = place_settings(held, project, scratch)
+        for place in (run.about.results, run.about.figures):
+            if (held.folder / place).is_dir():
+                shutil.copytree(held.folder / place, scratch / place, dirs_exist_ok=True)
+        place_records(run.records, scratch)
         (scratch / ".snakemake/incomplete").mkdir(parents=True, exist_ok=True)
-        _age(scratch)
+        _age(scratch, run.records)
         try:
-            todo = Study(scratch, about["overlays"]).to_do()
+            todo = Study(scratch, overlays, most_seconds=_MOST_SECONDS).to_do()
         except InputError as error:
-            todo = [str(error)]
+            todo = [str(error).replace(f"{scratch}/", "")]
     return Check("workflow", "snakemake --dry-run has nothing to do after unpacking", todo)
 
 
@@ -283,10 +216,9 @@ def copy_workflow(project: Path, scratch: Path) -> None:
             shutil.copy2(source, scratch / part)
 
 
-def _age(scratch: Path) -> None:
+def _age(scratch: Path, records: Mapping[str, Record]) -> None:
     """Date files so that each is older than what it was made from."""
     depth: dict[str, int] = {}
-    records = read_records(scratch)
     for record in upstream(records, records):
         depth[record.output] = 1 + max((depth.get(name, 0) for name in record.inputs), default=0)
     now = time.time()
@@ -300,12 +232,16 @@ def _age(scratch: Path) -> None:
 def check_here(study: Study) -> tuple[list[Check], bool]:
     """Check the results that are here against the records of Snakemake, without computing.
 
+    An archive that was unpacked is a copy of the project with results: what it left out on purpose
+    is not missed there.
+
     Returns
     -------
     checks : list of Check
-        Whether the study is finished; whether files are those that Snakemake read when it made
-        others from them; whether every chunk of every store is as sealed; whether figures were
-        drawn from the tables here; and how tables compare with the committed reference.
+        What is missing, and what would run and why; whether files are those that Snakemake read
+        when it made others from them; whether every chunk of every store is as sealed; whether
+        figures, tables and verdicts are as the run ended and follow from one another; and how they
+        compare with the committed reference.
     sound : bool
         Whether nothing failed.
 
@@ -318,50 +254,73 @@ def check_here(study: Study) -> tuple[list[Check], bool]:
     outputs = study.outputs()
     records = read_records(project)
     mine = {output.path: records[output.path] for output in outputs if output.path in records}
-    todo = [f"{it.path}: {it.status}" for it in outputs if it.pending]
-    about = {"figures": study.figures, "results": study.results}
+    final = [it.path for it in outputs if is_final(it.path, study)]
+    missing = [
+        f"{path}: missing; `make {path}` makes it"
+        for path in final
+        if not (project / path).exists()
+    ]
+    pending = sum(output.pending for output in outputs)
+    todo = _by_reason(study, pending, len(outputs)) if pending else []
+    left_out = None
+    if all((project / name).is_file() for name in (ABOUT, SUMS, LEFT_OUT)):
+        left_out = left_out_digests(project)
+    run = Run(project, about_study(study), mine)
     checks = [
+        Check("results", f"{len(final)} figures, tables and verdicts are there", missing),
         Check("workflow", f"{len(outputs)} files up to date", todo),
-        _check_inputs(mine, project),
+        check_inputs(run, left_out),
         _check_stores(mine, project),
-        _check_figures(project, about, project),
+        check_final(run),
+        check_figures(run, study.lock_digest),
+        check_columns(run),
+        check_verdicts(run, project / "config/claims.yaml", exact=False),
     ]
     reference = project / "results/reference"
     if reference.is_dir():
-        checks.append(check_digests(reference))
-        if read_about(reference)["settings"] == study.settings_digest:
-            checks.append(compare_tables(reference, project / study.results, study.lock_digest))
-        else:
-            words = "not compared: it was made with other settings"
-            checks.append(Check("results/reference", words))
+        checks.append(check_reference_itself(reference))
+        checks += check_reference(run, reference, study.lock_digest)
     return checks, not any(check.problems for check in checks)
 
 
-def left_out_digests(folder: Path) -> dict[str, str]:
-    """Digests of the files that a run left out, by their paths; none where nothing was."""
-    path = folder / LEFT_OUT
-    if not path.is_file():
-        return {}
-    with path.open(newline="", encoding="utf-8") as lines:
-        return {row["path"]: row["sha256"] for row in csv.DictReader(lines)}
+def _by_reason(study: Study, pending: int, n_outputs: int) -> list[str]:
+    """What would run, and why: a line per job where there are few, else one per kind of reason."""
+    plan = study.plan()
+    if len(plan) < _MOST_NAMED:
+        return [f"{job}: {reason}" for job, reason in plan]
+    kinds: dict[str, list[tuple[str, str]]] = {}
+    for job, reason in plan:
+        kinds.setdefault(reason.partition(": ")[0], []).append((job, reason))
+    lines = [f"{pending} of {n_outputs} files would be made; make why says more"]
+    for kind, jobs in sorted(kinds.items(), key=lambda it: -len(it[1])):
+        job, reason = jobs[0]
+        like_it = f", and {len(jobs) - 1} jobs like it: {kind}" if len(jobs) > 1 else f": {reason}"
+        lines.append(f"{job}{like_it}")
+    return lines
 
 
-def _check_inputs(
-    records: Mapping[str, Record], project: Path, left_out: Mapping[str, str] | None = None
-) -> Check:
-    """Hold files against the digests that they had when others were made from them."""
-    again = "; `make {0}` makes it again" if left_out is None else ""
-    left_out = left_out or {}
+def check_inputs(run: Run, elsewhere: Mapping[str, str] | None = None) -> Check:
+    """Hold files against the digests that they had when others were made from them.
+
+    Parameters
+    ----------
+    run : Run
+    elsewhere : mapping from str to str, optional
+        Digests of what does not lie in its folder, such as files that were left out on purpose;
+        None where there is none, and a missing file can be made again.
+    """
+    again = "; `make {0}` makes it again" if elsewhere is None else ""
+    elsewhere = elsewhere or {}
     digests: dict[str, set[str]] = {}
-    for record in records.values():
+    for record in run.records.values():
         for name, digest in record.digests.items():
             digests.setdefault(name, set()).add(digest)
     problems = []
     for name, expected in sorted(digests.items()):
-        if (project / name).is_file():
-            found = file_digest(project / name)
-        elif name in left_out:
-            found = left_out[name]
+        if (run.folder / name).is_file():
+            found = file_digest(run.folder / name)
+        elif name in elsewhere:
+            found = elsewhere[name]
         else:
             problems.append(f"{name}: missing" + again.format(name))
             continue
@@ -379,64 +338,3 @@ def _check_stores(records: Mapping[str, Record], project: Path) -> Check:
         except InputError as error:
             problems.append(str(error).replace(f"{project}/", ""))
     return Check("stores", f"{len(stores)} with every chunk as sealed", problems)
-
-
-def compare_tables(
-    expected: Path,
-    found: Path,
-    lock: str,
-    names: Sequence[str] = (),
-    rtol: float = table_differences.RTOL,
-    atol: float = table_differences.ATOL,
-) -> Check:
-    """Compare tables of two runs.
-
-    Parameters
-    ----------
-    expected : path
-        Folder with ``archive.json`` of the one run, and its tables.
-    found : path
-        Folder of the results of the other.
-    lock : str
-        SHA-256 of the lock file of the other.
-    names : sequence of str, optional
-        Tables to compare, by file name; all by default.
-    rtol, atol : float, optional
-        Tolerances, see `keystab.provenance.table_differences.difference`. They count where software
-        or processor differ; where both are the same, tables have to be the same to the last bit.
-
-    Returns
-    -------
-    Check
-    """
-    about = read_about(expected)
-    same_machine = alike(about, lock)
-    tables = expected / "tables"
-    if not tables.is_dir():
-        tables = expected / about["results"] / "tables"
-    paths = sorted(tables.glob("*.csv")) + sorted(tables.glob("*.parquet"))
-    paths = [path for path in paths if not names or path.name in names]
-    left_out = {PurePosixPath(path).name for path in left_out_digests(expected)}
-    new = sorted(set(names) - {path.name for path in paths} - left_out)
-    problems = [f"{name}: not in the run that it is compared with" for name in new]
-    notes: list[str] = []
-    same = 0
-    for path in paths:
-        other = found / "tables" / path.name
-        if not other.is_file():
-            problems.append(f"{path.name}: missing")
-        elif path.read_bytes() == other.read_bytes():
-            same += 1
-        else:
-            it = table_differences.file_difference(path, other, rtol, atol)
-            told = f"{path.name}: {it.words or 'the same numbers in other bytes'}"
-            (notes if it.within and not same_machine else problems).append(told)
-    allowed = f"numbers may differ by {rtol:g} of their size or by {atol:g}"
-    why = "same lock and processor" if same_machine else f"another lock or processor: {allowed}"
-    words = f"{same} of {len(paths)} the same to the last bit ({why})"
-    return Check("tables", words, problems, notes)
-
-
-def alike(about: Mapping[str, Any], lock: str) -> bool:
-    """Whether a run had this software and this kind of processor: then all bits are the same."""
-    return bool(about["lock"] == lock and about.get("arithmetic") == arithmetic())

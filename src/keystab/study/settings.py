@@ -54,7 +54,7 @@ def read_yaml(*paths: Path | str) -> Settings:
             ) from None
         if not isinstance(given, dict):
             raise InputError(f"{path}: holds no settings; write lines such as 'draft: true'")
-        _merge(merged, given)
+        merge(merged, given)
     return merged
 
 
@@ -144,10 +144,19 @@ def _default(schema: Schema) -> Any:
     return schema.get("default", {} if schema.get("type") == "object" else None)
 
 
-def _merge(below: Settings, above: Mapping[Any, Any]) -> None:
+def merge(below: Settings, above: Mapping[Any, Any]) -> None:
+    """Lay settings over others, in place: blocks are merged, lists and values are replaced.
+
+    Examples
+    --------
+    >>> below = {"detector": {"epsilon": 0.0, "kappa": 1.26}}
+    >>> merge(below, {"detector": {"epsilon": 1e-6}})
+    >>> below
+    {'detector': {'epsilon': 1e-06, 'kappa': 1.26}}
+    """
     for key, value in above.items():
         if isinstance(value, dict) and isinstance(below.get(key), dict):
-            _merge(below[key], value)
+            merge(below[key], value)
         else:
             below[key] = copy.deepcopy(value)
 

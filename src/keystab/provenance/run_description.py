@@ -1,0 +1,163 @@
+"""What a run says about itself in ``archive.json``; it is read with distrust."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import platform
+import re
+from pathlib import Path
+from typing import Any
+
+from keystab import __version__
+from keystab.errors import InputError
+
+__all__ = [
+    "ABOUT",
+    "LEFT_OUT",
+    "SUMS",
+    "About",
+    "about_of",
+    "arithmetic",
+    "folder_problem",
+    "read_about",
+]
+
+ABOUT = "archive.json"
+SUMS = "SHA256SUMS"
+LEFT_OUT = "left-out.csv"
+MOST_BYTES_OF_ABOUT = 1_000_000
+
+_OWN = {
+    "snakefile", "makefile", "environment.lock", "pyproject.toml", "archive.md", "license",
+    "benchmarks", "config", "docs", "profiles", "settings", "src", "tests", "tools", "workflow",
+}  # fmt: skip
+"""Names, in small letters, that no folder of results can have: they are the project's own."""
+
+_PART = re.compile(r"\w[\w .+-]*(?<![ .])")
+_DIGEST = re.compile("[0-9a-f]{64}")
+
+
+@dataclasses.dataclass(frozen=True)
+class About:
+    """What a run says about itself, in ``archive.json``.
+
+    Parameters
+    ----------
+    keystab : str
+        Version that wrote it.
+    lock, settings : str
+        SHA-256 of the lock file and of the settings.
+    overlays : tuple of str
+        Files of settings, laid over the project's own, by their places in the archive.
+    results, figures, logs : str
+        Folders, relative to the project.
+    arithmetic : str
+        See `arithmetic`.
+    zlib : str
+        Version of the library that compressed what PDF figures hold.
+    """
+
+    keystab: str
+    lock: str
+    settings: str
+    overlays: tuple[str, ...]
+    results: str
+    figures: str
+    logs: str
+    arithmetic: str
+    zlib: str = ""
+
+
+def read_about(folder: Path) -> About:
+    """Read what a run says about itself.
+
+    Raises
+    ------
+    InputError
+        If it does not say it.
+    """
+    path = folder / ABOUT
+    if not path.is_file() or path.stat().st_size > MOST_BYTES_OF_ABOUT:
+        raise InputError(f"{path}: no such file; make reference or make archive writes it")
+    try:
+        return about_of(path.read_bytes())
+    except InputError as error:
+        raise InputError(f"{path} {error}") from None
+
+
+def about_of(data: bytes) -> About:
+    """Check what a run says about itself.
+
+    Raises
+    ------
+    InputError
+        If another version wrote it, something is missing or of another type, or a folder could lie
+        outside or be one of the project's own. The name of the file is to be put before the text.
+
+    Examples
+    --------
+    >>> about_of(b'{"keystab": "0.0.1"}')  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    keystab.errors.InputError: was written by keystab 0.0.1, and this is ...
+    """
+    try:
+        said: Any = json.loads(data.decode("utf-8"))
+    except (ValueError, RecursionError):
+        raise InputError("is not JSON; make archive writes it") from None
+    if not isinstance(said, dict) or not isinstance(said.get("keystab"), str):
+        raise InputError("says nothing about a run; make archive writes it")
+    if said["keystab"] != __version__:
+        raise InputError(
+            f"was written by keystab {said['keystab'][:20]}, and this is {__version__}: check it "
+            "with that version"
+        )
+    texts = ("lock", "settings", "results", "figures", "logs", "arithmetic")
+    overlays = said.get("overlays")
+    if (
+        not all(isinstance(said.get(key), str) for key in texts)
+        or not all(_DIGEST.fullmatch(said[key]) for key in ("lock", "settings"))
+        or not isinstance(overlays, list)
+        or not all(isinstance(one, str) for one in overlays)
+    ):
+        raise InputError("says nothing about a run; make archive writes it")
+    for key in ("results", "figures", "logs"):
+        if problem := folder_problem(said[key]):
+            raise InputError(f"names as {key} {said[key][:80]!a}, which {problem}")
+    about = {key: said[key] for key in texts}
+    return About(said["keystab"], overlays=tuple(overlays), zlib=str(said.get("zlib", "")), **about)
+
+
+def folder_problem(text: str) -> str:
+    """Say why a folder cannot be one that a run wrote to; nothing where it can.
+
+    Examples
+    --------
+    >>> folder_problem("results/quick"), folder_problem("a/../workflow")
+    ('', 'is no folder within the project; give names with / between them')
+    >>> folder_problem("Workflow/rules")
+    "is one of the project's own; give another"
+    """
+    parts = text.split("/")
+    if not text.isprintable() or not all(_PART.fullmatch(part) for part in parts):
+        return "is no folder within the project; give names with / between them"
+    if parts[0].casefold() in _OWN or text.casefold() == "results/reference":
+        return "is one of the project's own; give another"
+    return ""
+
+
+def arithmetic() -> str:
+    """What the last digits of results depend on: the processor as numpy and its BLAS see it.
+
+    Two machines of which this is the same run the same instructions.
+    """
+    import numpy as np
+    import threadpoolctl
+
+    blas = {
+        str(library.get("architecture"))
+        for library in threadpoolctl.threadpool_info()
+        if library["user_api"] == "blas"
+    }
+    simd = np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", [])
+    return " ".join([platform.system(), platform.machine(), *sorted(blas), *sorted(simd)])
