@@ -11,7 +11,7 @@ import numpy as np
 
 import keystab
 from keystab.detection import search_cosine, search_rows
-from keystab.scalespace import dog, operators
+from keystab.scalespace import cosine_axis, dog
 from keystab.scalespace.sampling import Sampling, balanced_delta
 
 CAMERA_BLUR = 1.1
@@ -61,7 +61,7 @@ def forget_operators() -> None:
         search_rows.blocks_abreast,
         search_rows.expansion,
         search_cosine.interpolation,
-        operators.band_limited_basis,
+        cosine_axis.band_limited_basis,
     ):
         kept.cache_clear()
 

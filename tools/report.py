@@ -32,7 +32,7 @@ from keystab.errors import InputError
 from keystab.provenance.code_digest import fingerprint
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.study_folder import Study
-from keystab.study.claims import VERDICTS
+from keystab.study.verdicts import VERDICTS
 from keystab.utils.files import written_whole
 
 ROOT = Path(__file__).parents[1]

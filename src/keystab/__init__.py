@@ -15,9 +15,10 @@ Examples
 [15.0, 15.0, -1.0]
 """
 
+from functools import cache
 from importlib import import_module
 
-__version__ = "0.2.0"
+from keystab._version import __version__
 
 # Where each public name lives.
 _HOME = {
@@ -27,7 +28,7 @@ _HOME = {
     "fit_psf": "camera.psf_fit",
     "occurrence": "matching.unique_keypoints",
     "open_scale_space": "io.scale_space_store",
-    "open_views": "io.scale_space_store",
+    "open_views": "io.view_store",
     "read_picture": "io.pictures",
     "scale_space": "scalespace.dog",
     "scene_extrema": "truth.scene_extrema",
@@ -41,6 +42,7 @@ __all__ = ["__version__", *sorted(_HOME)]
 
 def __getattr__(name: str) -> object:
     if name in _HOME:
+        _forget_outdated_loops()
         return getattr(import_module(f"keystab.{_HOME[name]}"), name)
     raise AttributeError(f"module 'keystab' has no attribute {name!r}")
 
@@ -49,5 +51,6 @@ def __dir__() -> list[str]:
     return __all__
 
 
-# Not a plain import: it changes no result, and what a stage imports is part of its fingerprint.
-import_module("keystab.provenance.compiled_loops").forget_outdated()
+@cache
+def _forget_outdated_loops() -> None:
+    import_module("keystab.provenance.compiled_loops").forget_outdated()

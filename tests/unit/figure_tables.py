@@ -44,7 +44,7 @@ def balanced(n_spo: int) -> float:
 
 def fig1() -> dict[str, pd.DataFrame]:
     """Compute the true table of figure 1: it takes less than a second."""
-    from keystab.scalespace.semigroup import semigroup_table
+    from keystab.experiments.semigroup_table import semigroup_table
 
     return {"fig1": semigroup_table()}
 
@@ -518,7 +518,7 @@ def figs2() -> dict[str, pd.DataFrame]:
 
 def figs3() -> dict[str, pd.DataFrame]:  # noqa: N802
     """Compute true tables of figure S3 at a few apertures: they take less than a second."""
-    from keystab.camera.optics import optics_table, profile_table
+    from keystab.experiments.camera_blur import optics_table, profile_table
 
     profiles = profile_table(2.0, 4.5, count=41)
     return {"figS3": optics_table([1.4, 2.8, 5.6, 11.0], [4.5, 6.5]), "figS3_profiles": profiles}

@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystab.camera import simulation
-from keystab.camera.simulation import Scene, ViewSpec, simulate_view
+from keystab.camera.simulation import Scene, simulate, simulate_view
+from keystab.camera.views import ViewSpec, effective_blur, to_reference, to_view
 from keystab.errors import InputError
 from keystab.scalespace import cosine_series
 from keystab.utils import memory
+from keystab.utils.random import random_generator
 
 
 def picture(shape, seed=0):
@@ -29,7 +30,7 @@ def blob(shape, centre, sd):
 def blob_seen(spec, shape, centre, sd):
     """Closed form: the blob blurred by c S, at the places where the pixels look."""
     y, x = np.indices(spec.shape)
-    y, x = simulation.to_reference(spec, shape, y, x)
+    y, x = to_reference(spec, shape, y, x)
     variance = sd**2 + (spec.blur * spec.step) ** 2
     distance = (y - centre[0]) ** 2 + (x - centre[1]) ** 2
     return sd**2 / variance * np.exp(-0.5 * distance / variance)
@@ -49,7 +50,7 @@ def blob_seen(spec, shape, centre, sd):
 def test_blob_seen_by_the_camera_has_its_closed_form(step, shift, rotation, tolerance):
     shape, centre = (200, 240), (104.3, 117.9)
     spec = ViewSpec(1.1, step, (21, 17), shift, rotation)
-    view = simulation.simulate(blob(shape, centre, 6.0), spec)
+    view = simulate(blob(shape, centre, 6.0), spec)
     np.testing.assert_allclose(view, blob_seen(spec, shape, centre, 6.0), rtol=0, atol=tolerance)
     assert view.max() > 0.3
 
@@ -66,7 +67,7 @@ def test_centred_view_keeps_mirror_symmetry():
 
 
 def test_first_pixel_is_the_centre_of_its_block():
-    y, x = simulation.to_reference(ViewSpec(1.1, 10.0, (225, 400)), (2250, 4000), 0, 0)
+    y, x = to_reference(ViewSpec(1.1, 10.0, (225, 400)), (2250, 4000), 0, 0)
     assert (float(y), float(x)) == (4.5, 4.5)
 
 
@@ -109,8 +110,8 @@ def test_general_rotation_joins_quarter_turns_continuously():
 def test_rotation_agrees_with_direct_summation(blur):
     # White noise is the worst reference: all frequencies weigh the same.
     scene, spec = Scene(picture((90, 70))), ViewSpec(blur, 2.0, (24, 30), (0.2, 0.0), 0.7)
-    view = simulation.simulate(scene, spec)
-    y, x = simulation.to_reference(spec, scene.shape, *np.indices(spec.shape))
+    view = simulate(scene, spec)
+    y, x = to_reference(spec, scene.shape, *np.indices(spec.shape))
     exact = cosine_series.evaluate_at(scene.coefficients, y, x, blur * 2.0)
     np.testing.assert_allclose(view, exact, rtol=0, atol=2e-8)
 
@@ -119,8 +120,8 @@ def test_rotation_agrees_with_direct_summation(blur):
 def test_rotation_of_a_sharp_dense_view(blur):
     # Hardly any blur: the auxiliary grid is then as fine as the reference asks for.
     scene, spec = Scene(picture((260, 260))), ViewSpec(blur, 1.0, (24, 30), (0.2, 0.0), 0.7)
-    view = simulation.simulate(scene, spec)
-    y, x = simulation.to_reference(spec, scene.shape, *np.indices(spec.shape))
+    view = simulate(scene, spec)
+    y, x = to_reference(spec, scene.shape, *np.indices(spec.shape))
     exact = cosine_series.evaluate_at(scene.coefficients, y, x, blur)
     np.testing.assert_allclose(view, exact, rtol=0, atol=1e-7)
     assert not np.array_equal(view, exact)  # it did interpolate
@@ -128,17 +129,17 @@ def test_rotation_of_a_sharp_dense_view(blur):
 
 def test_rotation_in_pieces_is_the_same_picture(monkeypatch):
     scene, spec = Scene(picture((80, 80))), ViewSpec(0.9, 4.0, (15, 18), rotation=0.2)
-    whole = simulation.simulate(scene, spec)
-    monkeypatch.setattr(simulation, "_MOST_SAMPLES", 5000)
-    np.testing.assert_allclose(simulation.simulate(scene, spec), whole, rtol=0, atol=1e-8)
+    whole = simulate(scene, spec)
+    monkeypatch.setattr("keystab.camera.simulation._MOST_SAMPLES", 5000)
+    np.testing.assert_allclose(simulate(scene, spec), whole, rtol=0, atol=1e-8)
 
 
 def test_sparse_rotated_view_is_summed_directly(monkeypatch):
-    monkeypatch.setattr(simulation, "_MOST_SAMPLES", 1)  # never reached
+    monkeypatch.setattr("keystab.camera.simulation._MOST_SAMPLES", 1)  # never reached
     scene, spec = Scene(picture((60, 60))), ViewSpec(0.0, 15.0, (4, 4), rotation=0.3)
-    y, x = simulation.to_reference(spec, scene.shape, *np.indices(spec.shape))
+    y, x = to_reference(spec, scene.shape, *np.indices(spec.shape))
     exact = cosine_series.evaluate_at(scene.coefficients, y, x)
-    np.testing.assert_array_equal(simulation.simulate(scene, spec), exact)
+    np.testing.assert_array_equal(simulate(scene, spec), exact)
 
 
 @given(
@@ -151,8 +152,8 @@ def test_sparse_rotated_view_is_summed_directly(monkeypatch):
 @settings(max_examples=50)
 def test_maps_between_view_and_reference_are_inverse(step, shift, rotation, y, x):
     spec = ViewSpec(1.0, step, (9, 14), shift, rotation)
-    there = simulation.to_reference(spec, (50, 61), y, x)
-    back = simulation.to_view(spec, (50, 61), *there)
+    there = to_reference(spec, (50, 61), y, x)
+    back = to_view(spec, (50, 61), *there)
     np.testing.assert_allclose(back, (y, x), rtol=0, atol=1e-9)
 
 
@@ -186,12 +187,12 @@ def test_noise_depends_on_its_purpose_and_not_on_order():
 
 def test_random_generator_is_pinned():
     # Seeds are part of published results: a change of this number changes every noisy view.
-    assert simulation.random_generator("translations", 3).integers(10**9) == 647_051_989
+    assert random_generator("translations", 3).integers(10**9) == 647_051_989
 
 
 def test_random_generator_takes_no_floats():
     with pytest.raises(TypeError):
-        simulation.random_generator(0.1)  # type: ignore[arg-type]
+        random_generator(0.1)  # type: ignore[arg-type]
 
 
 def test_effective_blur_is_what_a_blurred_reference_gives():
@@ -202,7 +203,7 @@ def test_effective_blur_is_what_a_blurred_reference_gives():
     )
     blurred *= sd**2 / (sd**2 + 4)  # the same blob after a blur of c_ref = 2
     seen = simulate_view(blurred, 0.9, 4.0, (15, 15))
-    expected = simulate_view(sharp, simulation.effective_blur(0.9, 4.0, 2.0), 4.0, (15, 15))
+    expected = simulate_view(sharp, effective_blur(0.9, 4.0, 2.0), 4.0, (15, 15))
     np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-12)
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from keystab.errors import InputError
 from keystab.stages import judge_claims
-from keystab.study import claims
+from keystab.study import claims, claims_report, expressions, verdicts
 
 ROOT = Path(__file__).parents[2]
 LEDGER = ROOT / "config/claims.yaml"
@@ -49,9 +49,9 @@ def claim(**changes) -> claims.Claim:
     return claims.parse_claims([entry(**changes)])[0]
 
 
-def taken(column: str, take: str, rows: str = "", **ends: str) -> claims.Measured:
+def taken(column: str, take: str, rows: str = "", **ends: str) -> verdicts.Measured:
     given = claims.Quantity("q", tables=("rates",), rows=rows, column=column, take=take, **ends)
-    return claims.measured(given, TABLES)
+    return verdicts.measured(given, TABLES)
 
 
 # The language of expressions
@@ -75,14 +75,14 @@ def taken(column: str, take: str, rows: str = "", **ends: str) -> claims.Measure
     ],
 )
 def test_expressions_mean_what_they_say(expression, value):
-    assert claims.evaluate(expression, {"a": 3.0, "b": -4.0, "text": "fine"}) == value
+    assert expressions.evaluate(expression, {"a": 3.0, "b": -4.0, "text": "fine"}) == value
 
 
 def test_expressions_work_on_columns():
     names = {name: RATES[name] for name in RATES}
-    chosen = claims.evaluate("n_spo > 3 and (rate < 0.15 or not low < high)", names)
+    chosen = expressions.evaluate("n_spo > 3 and (rate < 0.15 or not low < high)", names)
     assert list(chosen) == [True, False, False]
-    assert claims.evaluate("max(rate, 0.2)", names).tolist() == [0.2, 0.4, 0.2]
+    assert expressions.evaluate("max(rate, 0.2)", names).tolist() == [0.2, 0.4, 0.2]
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_expressions_work_on_columns():
 )
 def test_nothing_else_can_be_said(expression, says):
     with pytest.raises(InputError, match=re.escape(says)) as caught:
-        claims.evaluate(expression, {"a": 1.0, "b": 2.0})
+        expressions.evaluate(expression, {"a": 1.0, "b": 2.0})
     assert "\n" not in str(caught.value)
 
 
@@ -152,7 +152,7 @@ def test_intervals_are_those_of_the_row_that_is_taken():
 def test_rows_without_a_number_do_not_count():
     tables = {"rates": pd.DataFrame({"n_spo": [3, 4, 5], "rate": [np.nan, 0.2, 0.1]})}
     quantity = claims.Quantity("q", tables=("rates",), column="rate", take="first n_spo")
-    assert claims.measured(quantity, tables).value == 0.2
+    assert verdicts.measured(quantity, tables).value == 0.2
 
 
 def test_tables_are_joined_on_what_they_share():
@@ -163,7 +163,7 @@ def test_tables_are_joined_on_what_they_share():
     quantity = claims.Quantity(
         "q", tables=("seen", "unique"), rows="detected == 1", column="stability < 1", take="share"
     )
-    assert claims.measured(quantity, tables).value == pytest.approx(1 / 3)
+    assert verdicts.measured(quantity, tables).value == pytest.approx(1 / 3)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_what_a_table_cannot_give_is_an_error(column, take, rows, says):
 
 
 def verdict(**changes) -> str:
-    return claims.judge(claim(**changes), TABLES).verdict
+    return verdicts.judge(claim(**changes), TABLES).verdict
 
 
 WEAKER = {"criterion": "drop > 0", "words": "it falls at least"}
@@ -211,11 +211,11 @@ def test_every_verdict_can_be_given():
         "not testable": verdict(value=None, criterion=None, reason="It is not published."),
     }
     assert list(given) == list(given.values())
-    assert set(given) == set(claims.VERDICTS)
+    assert set(given) == set(verdicts.VERDICTS)
 
 
 def test_a_criterion_that_holds_needs_no_condition():
-    judged = claims.judge(claim(condition=WEAKER), TABLES)
+    judged = verdicts.judge(claim(condition=WEAKER), TABLES)
     assert (judged.verdict, judged.note) == ("reproduced", "")
 
 
@@ -226,37 +226,37 @@ def test_a_condition_that_fails_too_saves_nothing():
 
 
 def test_the_condition_is_told():
-    judged = claims.judge(claim(criterion="fine > 0.5", condition=WEAKER, note="See."), TABLES)
+    judged = verdicts.judge(claim(criterion="fine > 0.5", condition=WEAKER, note="See."), TABLES)
     assert judged.note == "Condition: it falls at least. See."
 
 
 def test_other_numbers_flip_the_verdict():
     flipped = {"rates": RATES.assign(rate=RATES["rate"] * 2)}
-    assert claims.judge(claim(), TABLES).verdict == "reproduced"
-    assert claims.judge(claim(), flipped).verdict == "not reproduced"
+    assert verdicts.judge(claim(), TABLES).verdict == "reproduced"
+    assert verdicts.judge(claim(), flipped).verdict == "not reproduced"
 
 
 def test_missing_rows_make_a_claim_not_testable():
     coarse = {"rates": RATES[RATES["n_spo"] > 3]}
-    judged = claims.judge(claim(), coarse)
+    judged = verdicts.judge(claim(), coarse)
     assert judged.verdict == "not testable"
     assert judged.note == "Missing: rates has no row with n_spo == 3."
     # Numbers that no criterion uses may be missing.
-    assert claims.judge(claim(criterion="fine > 0"), coarse).verdict == "reproduced"
+    assert verdicts.judge(claim(criterion="fine > 0"), coarse).verdict == "reproduced"
     # A condition that cannot be asked does not excuse.
-    judged = claims.judge(claim(criterion="fine > 0.5", condition=WEAKER), coarse)
+    judged = verdicts.judge(claim(criterion="fine > 0.5", condition=WEAKER), coarse)
     assert judged.verdict == "not reproduced" and "Its condition is not tested" in judged.note
 
 
 def test_nothing_over_nothing_is_not_testable():
     value = ENTRY["value"] | {"ratio": "(fine - fine) / (coarse - coarse)"}
-    judged = claims.judge(claim(value=value, criterion="ratio < 1"), TABLES)
+    judged = verdicts.judge(claim(value=value, criterion="ratio < 1"), TABLES)
     assert (judged.verdict, judged.note) == ("not testable", "Missing: no number: ratio.")
 
 
 def test_errors_name_the_claim():
     with pytest.raises(InputError, match="^claim falls: rates: |^claim falls: .*does not know"):
-        claims.judge(claim(), {"rates": RATES.drop(columns="rate")})
+        verdicts.judge(claim(), {"rates": RATES.drop(columns="rate")})
 
 
 # The file of claims
@@ -352,16 +352,16 @@ def test_every_claim_names_what_exists(listed):
 
 @pytest.mark.parametrize("listed", [each for each in LISTED if each.criterion], ids=lambda listed: listed.id)  # fmt: skip
 def test_every_criterion_can_hold_and_can_fail(listed):
-    names = sorted(claims.names_of(listed.criterion))
+    names = sorted(expressions.names_of(listed.criterion))
     assert set(names) <= {part.name for part in listed.quantities}
     random = np.random.default_rng(1)
     draws = {
         name: 10.0 ** random.uniform(-3, 3, 4000) * random.choice([-1, 1], 4000) for name in names
     }
     near = {name: 1 + 0.03 * random.standard_normal(4000) for name in names}  # almost equal ones
-    answers = [claims.evaluate(listed.criterion, drawn) for drawn in (draws, near)]
+    answers = [expressions.evaluate(listed.criterion, drawn) for drawn in (draws, near)]
     small = {name: random.uniform(0, 3, 4000) for name in names}
-    answers.append(claims.evaluate(listed.criterion, small))
+    answers.append(expressions.evaluate(listed.criterion, small))
     answers = np.concatenate(answers)
     assert answers.any() and not answers.all()
 
@@ -393,14 +393,14 @@ def test_the_stage_writes_the_ledger_and_prints_the_tally(tmp_path, capsys):
     ]  # fmt: skip
 
     records = json.loads(out["json"].read_text())
-    assert all(tuple(record) == claims.FIELDS for record in records)
+    assert all(tuple(record) == claims_report.FIELDS for record in records)
     assert records[0]["table"] == ["rates.csv"] and records[0]["verdict"] == "reproduced"
     assert records[0]["interval"] == {"fine": [0.08, 0.2]}
     assert records[2]["value"] == {"fine": None} and records[3]["value"] == {"fine": "inf"}
 
     with out["csv"].open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == claims.FIELDS and len(rows) == 4
+    assert tuple(rows[0]) == claims_report.FIELDS and len(rows) == 4
     assert rows[0]["value"] == "coarse 0.4; fine 0.1; drop 0.3"
     assert rows[0]["interval"] == "fine 0.08 to 0.2"
 

@@ -17,6 +17,7 @@ from keystab import scale_space
 from keystab.camera.psf_fit import fit_psf
 from keystab.camera.simulation import simulate_view
 from keystab.cli import main as cli
+from keystab.cli.parser import build_parser
 from keystab.detection.detector import detect_keypoints
 from keystab.detection.extrema import bytes_of_search
 from keystab.io.pictures import read_picture, write_picture
@@ -65,7 +66,7 @@ def test_detect_passes_every_parameter(picture, tmp_path):
     }
     parameters = inspect.signature(detect_keypoints).parameters
     assert list(parameters)[1:] == list(changed)  # every parameter has a flag
-    defaults = cli._parser().parse_args(["detect", "x.png", "--camera-blur", "1"])
+    defaults = build_parser().parse_args(["detect", "x.png", "--camera-blur", "1"])
     for name, parameter in list(parameters.items())[2:]:
         assert getattr(defaults, name) == parameter.default, name
     flags = []
@@ -90,7 +91,7 @@ def test_truth_passes_every_parameter(picture, tmp_path, capsys):
     }
     parameters = inspect.signature(true_extrema).parameters
     assert list(parameters)[1:] == list(changed)  # every parameter has a flag
-    defaults = cli._parser().parse_args(["truth", "x.png", "--camera-blur", "1"])
+    defaults = build_parser().parse_args(["truth", "x.png", "--camera-blur", "1"])
     for name, parameter in list(parameters.items())[2:]:
         assert getattr(defaults, name) == parameter.default, name
     flags = []

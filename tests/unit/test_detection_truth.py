@@ -12,8 +12,8 @@ from keystab.detection.detector import detect_keypoints
 from keystab.detection.extrema import discrete_extrema
 from keystab.errors import InputError
 from keystab.scalespace.dog import scale_space
-from keystab.scalespace.operators import SplineAxis, cosine_domain_kernel
 from keystab.scalespace.sampling import balanced_delta
+from keystab.scalespace.spline_axis import SplineAxis, cosine_domain_kernel
 
 KAPPA = 2 ** (1 / 3)
 

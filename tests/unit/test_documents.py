@@ -16,8 +16,9 @@ import yaml
 
 from keystab import scale_space
 from keystab.camera.views import ViewSpec
-from keystab.cli import main as cli
-from keystab.io.scale_space_store import write_scale_space, write_views
+from keystab.cli.parser import build_parser
+from keystab.io.scale_space_store import write_scale_space
+from keystab.io.view_store import write_views
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(
@@ -135,7 +136,7 @@ def test_commands_of_the_readme_are_understood():
     commands = [shlex.split(line) for line in lines if line.startswith("keystab ")]
     assert {command[1] for command in commands} == {"simulate", "detect", "truth", "inspect"}
     for command in commands:
-        cli._parser().parse_args(command[1:])  # exits where it does not understand
+        build_parser().parse_args(command[1:])  # exits where it does not understand
 
 
 def test_examples_of_the_readme_run(monkeypatch):

@@ -10,7 +10,7 @@ import yaml
 
 from keystab.camera.view_sets import per_view, view_shapes, view_specs
 from keystab.errors import InputError
-from keystab.study import feasibility, settings
+from keystab.study import feasibility, picture_checks, settings
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
@@ -71,7 +71,7 @@ def test_shipped_settings_are_feasible(path):
     ],
 )  # fmt: skip
 def test_contradictions_get_one_line(changes, line, monkeypatch):
-    monkeypatch.setattr(feasibility, "_free_bytes", lambda folder: int(1e12))
+    monkeypatch.setattr(picture_checks, "_free_bytes", lambda folder: int(1e12))
     with pytest.raises(InputError) as caught:
         feasibility.require(changed(("results", "empty"), *changes), ROOT)
     (said,) = str(caught.value).splitlines()
@@ -79,12 +79,12 @@ def test_contradictions_get_one_line(changes, line, monkeypatch):
 
 
 def test_stores_that_exist_need_no_more_room(tmp_path, monkeypatch):
-    monkeypatch.setattr(feasibility, "_free_bytes", lambda folder: 0)
+    monkeypatch.setattr(picture_checks, "_free_bytes", lambda folder: 0)
     config = changed(("results", str(tmp_path)), ("keep_scale_spaces", [3]))
-    assert feasibility.picture_problems(config, ROOT)
+    assert picture_checks.picture_problems(config, ROOT)
     (tmp_path / "scale_space").mkdir()
     (tmp_path / "scale_space" / "n3.sha256").touch()
-    assert not feasibility.picture_problems(config, ROOT)
+    assert not picture_checks.picture_problems(config, ROOT)
 
 
 def test_views_of_a_set():

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from keystab.camera.simulation import ViewSpec
+from keystab.camera.views import ViewSpec
 from keystab.errors import InputError
-from keystab.io import scale_space_store
+from keystab.io import scale_space_store, view_store
 from keystab.io.checksums import write_seal
 from keystab.io.describe import describe
 from keystab.io.tables import write_table
@@ -34,7 +34,7 @@ def test_scale_space(tmp_path):
 
 def test_views(tmp_path):
     specs = [ViewSpec(blur, 10.0, (12, 16)) for blur in (0.5, 1.1)]
-    scale_space_store.write_views([IMAGE, IMAGE], specs, tmp_path, {"set": "examples"})
+    view_store.write_views([IMAGE, IMAGE], specs, tmp_path, {"set": "examples"})
     text = describe(tmp_path)
     assert "2 simulated views of float32" in text
     assert "camera blur 0.5 to 1.1 pixels" in text and "step 10 reference pixels" in text

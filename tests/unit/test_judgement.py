@@ -12,13 +12,8 @@ from scenes import blobs
 from keystab.detection.detector import detect_keypoints, extrema_table
 from keystab.detection.extrema import discrete_extrema
 from keystab.detection.refinement import MOST_MODELS, trace
-from keystab.evaluation.recall_precision import (
-    causes,
-    judged,
-    kept_and_lost,
-    mean_over_views,
-    partners,
-)
+from keystab.evaluation.recall_precision import causes, judged, mean_over_views, partners
+from keystab.experiments.refinement_choices import kept_and_lost
 from keystab.scalespace.dog import scale_space
 from keystab.truth.true_extrema import true_extrema
 

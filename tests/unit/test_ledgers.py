@@ -11,7 +11,7 @@ import yaml
 from keystab.errors import InputError
 from keystab.io.tables import read_table
 from keystab.stages import compare_claims
-from keystab.study import claims, claims_by_scene
+from keystab.study import claims, claims_by_scene, claims_report, verdicts
 
 RATE = {"table": "rates", "column": "rate", "take": "max", "low": "low", "high": "high"}
 COUNT = {"table": "rates", "column": "n", "take": "max"}
@@ -26,8 +26,10 @@ CLAIMS = [
 def ledger(folder, rate: float, entries=CLAIMS):
     """Write the ledger of a picture in which a rate was found; its path."""
     table = pd.DataFrame({"rate": [rate], "low": [rate - 0.05], "high": [rate + 0.05], "n": [7]})
-    judged = claims.judge_all(claims.parse_claims(entries), {"rates": table})
-    claims.write_ledger(judged, *(folder / f"claims.{kind}" for kind in ("csv", "json", "md")))
+    judged = verdicts.judge_all(claims.parse_claims(entries), {"rates": table})
+    claims_report.write_ledger(
+        judged, *(folder / f"claims.{kind}" for kind in ("csv", "json", "md"))
+    )
     return folder / "claims.csv"
 
 

@@ -15,12 +15,11 @@ from keystab.camera.optics import (
     diffraction_mtf,
     fit_camera,
     lens_transfer,
-    optics_table,
     pixel_transfer,
-    profile_table,
     psf_profile,
 )
 from keystab.errors import InputError
+from keystab.experiments.camera_blur import optics_table, profile_table
 
 # The Gaussian nearest to a box of side 1: c^2 erf(u)^2 / c is greatest at u = 1 / (sqrt(8) c).
 BOX = 1 / (np.sqrt(8) * brentq(lambda u: erf(u) - 4 * u * np.exp(-(u**2)) / np.sqrt(np.pi), 0.5, 2))

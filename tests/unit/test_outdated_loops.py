@@ -60,14 +60,31 @@ def test_a_removal_that_another_process_was_faster_at_goes_on(package, monkeypat
     assert kept(package) == {room: {"caller.pyc"} for room in ROOMS}
 
 
-def test_the_library_does_so_when_it_is_imported(tmp_path):
+CLAIMS = ", ".join(f"'--{name}=x'" for name in ("claims", "tables", "csv", "json", "markdown"))
+
+
+@pytest.mark.parametrize(
+    ("code", "forgotten"),
+    [
+        ("import keystab; keystab.__version__", False),
+        ("from keystab.stages import judge_claims", False),
+        ("import keystab; keystab.balanced_delta", True),
+        ("from keystab import InputError", True),
+        ("from keystab.cli.main import main; main(['inspect', 'nothing'])", True),
+        (f"from keystab.stages.judge_claims import main; main([{CLAIMS}])", True),
+    ],
+)
+def test_the_library_forgets_when_it_is_used_and_not_when_it_is_imported(code, forgotten, tmp_path):
     shutil.copytree(
         PACKAGE_FOLDER, tmp_path / "keystab", ignore=shutil.ignore_patterns("__pycache__")
     )
     old = tmp_path / "keystab" / "detection" / "__pycache__" / "extrema.old.nbi"
     old.parent.mkdir()
     old.touch()
-    command = [sys.executable, "-c", "import keystab; print(keystab.__file__)"]
-    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    command = [sys.executable, "-c", f"{code}\nimport keystab; print(keystab.__file__)"]
+    variables = {name: os.environ[name] for name in os.environ if name != "NUMBA_CACHE_DIR"}
+    run = subprocess.run(
+        command, cwd=tmp_path, env=variables, capture_output=True, text=True, check=True
+    )
     assert str(tmp_path) in run.stdout
-    assert not old.exists()
+    assert old.exists() is not forgotten

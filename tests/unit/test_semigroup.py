@@ -7,16 +7,15 @@ from hypothesis import strategies as st
 from scipy.optimize import curve_fit
 
 from keystab.errors import InputError
+from keystab.experiments.semigroup_table import SIGMAS, semigroup_table
 from keystab.scalespace.semigroup import (
     METHODS,
-    SIGMAS,
     blob_profile,
     blur_profile,
     discrete_analogue_kernel,
     fitted_blur,
     sampled_kernel,
     semigroup_residual,
-    semigroup_table,
 )
 
 widths = st.floats(0.1, 2.0)

@@ -12,30 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
+from keystab.camera.common_field import in_common_field, to_common_frame, windows_of_common_field
 from keystab.camera.simulation import Scene, simulate
-from keystab.camera.view_sets import (
-    common_scales,
-    expanded,
-    in_common_field,
-    members,
-    per_view,
-    to_common_frame,
-    view_shapes,
-    view_specs,
-    windows_of_common_field,
-)
+from keystab.camera.view_sets import expanded, members, per_view, view_shapes, view_specs
 from keystab.camera.views import ViewSpec, to_reference, to_view
 from keystab.detection.detector import detect_keypoints
 from keystab.detection.refinement import refined_keypoints
 from keystab.detection.view_detector import Detector, detect_in_view
 from keystab.experiments.view_stability import (
-    CommonRange,
     count_table,
     curve_table,
     match_views,
     precision_table,
     scale_table,
 )
+from keystab.matching.common_range import CommonRange, common_scales
 from keystab.matching.correspondence import matched
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}

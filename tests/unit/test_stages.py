@@ -234,7 +234,7 @@ def test_refined_keypoints_are_counted_with_and_without_an_upper_end(reference, 
 
 
 def test_the_truth_is_that_of_the_stored_view(reference, tmp_path):
-    from keystab.stages._inputs import read_view
+    from keystab.io.view_store import read_view
     from keystab.truth.true_extrema import true_extrema
 
     assert simulate.main(view_arguments(reference, tmp_path, step="5", blur="0.9")) == 0
@@ -337,7 +337,7 @@ def test_a_picture_without_detail_has_no_keypoints_and_is_named_where_some_are_n
 
 
 def test_blur_of_the_reference_adds_to_that_of_the_camera(reference, tmp_path):
-    from keystab.stages._inputs import read_view
+    from keystab.io.view_store import read_view
 
     simulate.main(view_arguments(reference, tmp_path, blur="0.9", step="4", reference_blur="1.6"))
     view = read_view(tmp_path / "views", tmp_path / "views.sha256")

@@ -12,9 +12,9 @@ import textwrap
 import numpy as np
 import pytest
 
-from keystab.camera.simulation import ViewSpec
+from keystab.camera.views import ViewSpec
 from keystab.errors import InputError
-from keystab.io import scale_space_store
+from keystab.io import scale_space_store, view_store, zarr_groups
 from keystab.io.checksums import seal
 from keystab.utils import memory
 
@@ -190,7 +190,7 @@ def test_missing_chunk_is_found_on_opening(store):
     for opening in (
         scale_space_store.open_scale_space,
         scale_space_store.StoredScaleSpace,
-        scale_space_store.attributes_of,
+        zarr_groups.attributes_of,
     ):
         with pytest.raises(InputError, match=r"dog/c/0/2/0 is missing; delete the store"):
             opening(store)
@@ -246,7 +246,7 @@ def test_what_is_no_store_gets_one_line(store, tmp_path):
         with pytest.raises(InputError, match="no store of keystab here"):
             scale_space_store.open_scale_space(path)
     with pytest.raises(InputError, match="a store of scale-space, not of views"):
-        scale_space_store.open_views(store)
+        view_store.open_views(store)
     description = store / "data.zarr" / "zarr.json"
     for text in ("{", json.dumps({"zarr_format": 3}), "[]"):
         description.write_text(text)
@@ -271,12 +271,12 @@ IMAGES = [np.random.default_rng(k).random(spec.shape) for k, spec in enumerate(S
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_views_round_trip(tmp_path, dtype):
-    scale_space_store.write_views(iter(IMAGES), SPECS, tmp_path, {"set": "examples"}, dtype=dtype)
-    views = scale_space_store.open_views(tmp_path)
+    view_store.write_views(iter(IMAGES), SPECS, tmp_path, {"set": "examples"}, dtype=dtype)
+    views = view_store.open_views(tmp_path)
     assert views["image"].dims == ("view", "y", "x") and views["image"].dtype == dtype
     assert views["image"].shape == (2, 5, 8) and views.attrs["set"] == "examples"
     for k, image in enumerate(IMAGES):
-        read = scale_space_store.view(views, k)
+        read = view_store.view(views, k)
         assert read.dtype == np.float64
         np.testing.assert_array_equal(read, image.astype(dtype))
     assert np.isnan(views["image"][1, 4:]).all() and np.isnan(views["image"][1, :, 6:]).all()
@@ -294,25 +294,25 @@ def test_views_round_trip(tmp_path, dtype):
 
 def test_views_are_checked(tmp_path):
     with pytest.raises(InputError, match="empty"):
-        scale_space_store.write_views([], [], tmp_path)
+        view_store.write_views([], [], tmp_path)
     with pytest.raises(InputError, match="float16"):
-        scale_space_store.write_views(IMAGES, SPECS, tmp_path, dtype="float16")
+        view_store.write_views(IMAGES, SPECS, tmp_path, dtype="float16")
     with pytest.raises(InputError, match=r"view 0 has the shape \(4, 6\), not \(5, 8\)"):
-        scale_space_store.write_views(IMAGES[::-1], SPECS, tmp_path)
+        view_store.write_views(IMAGES[::-1], SPECS, tmp_path)
     with pytest.raises(ValueError, match="argument"):
-        scale_space_store.write_views(IMAGES[:1], SPECS, tmp_path)
+        view_store.write_views(IMAGES[:1], SPECS, tmp_path)
     assert os.listdir(tmp_path) == []
 
 
 def test_damaged_and_missing_views_are_found(tmp_path):
-    scale_space_store.write_views(IMAGES, SPECS, tmp_path)
-    views = scale_space_store.open_views(tmp_path)
+    view_store.write_views(IMAGES, SPECS, tmp_path)
+    views = view_store.open_views(tmp_path)
     chunk = tmp_path / "data.zarr" / "image" / "c" / "1" / "0" / "0"
     flip(chunk, 7)
     with pytest.raises(InputError, match="view 1 is damaged"):
-        scale_space_store.view(views, 1)
+        view_store.view(views, 1)
     with pytest.raises(InputError, match="there is no view 2; the set has views 0 to 1"):
-        scale_space_store.view(views, 2)
+        view_store.view(views, 2)
     chunk.unlink()
     with pytest.raises(InputError, match="image/c/1/0/0 is missing"):
-        scale_space_store.open_views(tmp_path)
+        view_store.open_views(tmp_path)

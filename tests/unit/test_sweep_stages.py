@@ -10,8 +10,8 @@ import scenes
 
 from keystab.io.pictures import write_picture
 from keystab.io.tables import read_table
+from keystab.io.view_store import read_view
 from keystab.stages import crop_views, detect_views, match_sweep, noise_theory, simulate
-from keystab.stages._inputs import read_view
 
 KAPPA = "1.2599210498948732"
 NOISES = (0.0, 0.02)

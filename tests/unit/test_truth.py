@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from critical_curves import critical_balance, crossings, slice_extrema
 from scenes import blob, blobs
 from scipy.spatial import cKDTree
 
@@ -14,7 +15,6 @@ from keystab.detection.detector import detect_keypoints
 from keystab.errors import InputError
 from keystab.scalespace import cosine_series
 from keystab.scalespace.continuous_dog import DogSeries
-from keystab.truth.curves import critical_balance, crossings, slice_extrema
 from keystab.truth.scene_extrema import scene_extrema
 from keystab.truth.true_extrema import true_extrema
 
@@ -234,7 +234,7 @@ def test_wrong_input_gets_one_line(change, words):
 
 @pytest.mark.parametrize("seed", [3, 5, 7])
 def test_following_the_extrema_of_slices_finds_the_same(seed):
-    # Shares the sums with true_extrema, but no seed: see keystab.truth.curves.
+    # Shares the sums with true_extrema, but no seed: see critical_curves.
     image = blobs((44, 52), seed)
     height, width = image.shape
     found = crossings(DogSeries.of_image(image, 1.1, KAPPA), 1.1, 2.2)

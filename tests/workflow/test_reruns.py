@@ -62,6 +62,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
         ("src/keystab/detection/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
         ("src/keystab/detection/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS | {"detect_blobs"}),
         ("src/keystab/evaluation/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "judge_keypoints", "truth"} | PREDICTING),
+        ("src/keystab/__init__.py", '"fit_psf": ', '"blob_image": "scalespace.gaussian_blobs",\n    "fit_psf": ', set()),
         ("src/keystab/stages/cut_cubes.py", "    args = ", "    MORE = 1\n    args = ", {"cut_cubes", "fig6"}),
         ("src/keystab/study/settings.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", set()),
         ("src/keystab/figures/palette.py", '"condition": "#A8458A"', '"condition": "#A8458B"', {"fig5"}),
@@ -90,7 +91,7 @@ def test_edits_of_code(finished, name, old, new, expected):
     ("name", "old", "new"),
     [
         ("config/claims.yaml", "criterion: new > 0", "criterion: new >= 0"),
-        ("src/keystab/study/claims.py", "\nVERDICTS = ", "\nMORE = 1\nVERDICTS = "),
+        ("src/keystab/study/verdicts.py", "\nVERDICTS = ", "\nMORE = 1\nVERDICTS = "),
     ],
 )
 def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old, new):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from project import ROOT
 
-from keystab.study.claims import FIELDS
+from keystab.study.claims_report import FIELDS
 
 PICTURES = sorted((ROOT / "config/pictures").glob("*.yaml"))
 LEDGER = f"{','.join(FIELDS)}\none,,,,,,,,,reproduced,\n"

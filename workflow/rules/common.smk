@@ -21,7 +21,7 @@ import yaml
 from keystab.camera import view_sets
 from keystab.errors import InputError
 from keystab.provenance import code_digest
-from keystab.study import claims_by_scene, feasibility, settings
+from keystab.study import claims_by_scene, feasibility, picture_checks, settings
 
 try:
     config.update(
@@ -51,7 +51,7 @@ DRAWN = config["figures"]
 LOGS = config["logs"]
 
 # Samplings whose scale-space is written to a store; all others are streamed.
-KEPT = feasibility.kept_n_spo(config)
+KEPT = picture_checks.kept_n_spo(config)
 STREAMED = sorted(set(config["samplings"]["n_spo"]) - set(KEPT))
 
 # The same for sets of views: all or none.

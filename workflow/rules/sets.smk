@@ -292,7 +292,7 @@ def kappa_of_file(wildcards):
 
 
 # Figure predictors: further pictures, and the samplings whose detections it scores.
-PICTURES = feasibility.further_pictures(config)
+PICTURES = picture_checks.further_pictures(config)
 PREDICTED_N_SPO = [
     n_spo for n_spo in config["predictors"]["n_spo"] if n_spo in config["samplings"]["n_spo"]
 ] or sorted({config["samplings"]["n_spo"][0], config["samplings"]["n_spo"][-1]})

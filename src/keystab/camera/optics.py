@@ -33,19 +33,14 @@ cycles per micrometre, unless they are said to be in pixels.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keystab.errors import InputError
 from keystab.utils import validation
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -453,138 +448,3 @@ def _rule(n: int) -> tuple[Array, Array]:
     """Return the rule of `n` nodes; making one costs more than using it."""
     nodes, weights = np.polynomial.legendre.leggauss(n)
     return (nodes + 1) / 2, weights / 2
-
-
-def optics_table(
-    f_numbers: Sequence[float],
-    pitches: Sequence[float],
-    wavelength: float = 0.55,
-    fill_factor: float = 1.0,
-    defocus: float = 28.0,
-    spherical: float = 2.7,
-) -> pd.DataFrame:
-    """Compute the camera blur for lenses of three kinds, many apertures and pixel pitches.
-
-    Parameters
-    ----------
-    f_numbers : sequence of float
-        F-numbers, > 0.
-    pitches : sequence of float
-        Pixel pitches in micrometres, > 0.
-    wavelength : float, default 0.55
-        In micrometres.
-    fill_factor : float, default 1
-        Share of a pixel's area that collects light.
-    defocus : float, default 28
-        Distance of the sensor from the focus in micrometres, for the model ``defocus``.
-    spherical : float, default 2.7
-        Spherical aberration at f/2 in wavelengths, for the model ``spherical``.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per model, pitch and f-number: ``model``, ``pitch`` (micrometres), ``f_number``,
-        ``c`` (pixels), ``c_um`` (micrometres), ``residual`` (see `GaussianFit`), ``w20`` and
-        ``w40`` (wavelengths), ``wavelength`` and ``fill_factor``.
-
-    Raises
-    ------
-    InputError
-        If a parameter is out of range.
-
-    Examples
-    --------
-    >>> table = optics_table([1.4, 2.8, 8.0], [6.5]).set_index(["model", "f_number"])
-    >>> table["c"].unstack().loc[["diffraction", "defocus"]].round(2).to_numpy().tolist()
-    [[0.36, 0.37, 0.43], [0.95, 0.49, 0.43]]
-    """
-    import pandas as pd
-
-    _check_lists(f_numbers=f_numbers, pitches=pitches)
-    rows = []
-    for model in MODELS:
-        for pitch in pitches:
-            for f_number in f_numbers:
-                what = camera(model, wavelength, f_number, pitch, fill_factor, defocus, spherical)
-                fit = fit_camera(what)
-                rows.append(
-                    {
-                        "model": model,
-                        "pitch": float(pitch),
-                        "f_number": float(f_number),
-                        "c": fit.blur,
-                        "c_um": fit.blur * pitch,
-                        "residual": fit.residual,
-                        "w20": what.w20,
-                        "w40": what.w40,
-                        "wavelength": float(wavelength),
-                        "fill_factor": float(fill_factor),
-                    }
-                )
-    return pd.DataFrame(rows)
-
-
-def profile_table(
-    f_number: float,
-    pitch: float,
-    wavelength: float = 0.55,
-    fill_factor: float = 1.0,
-    defocus: float = 28.0,
-    spherical: float = 2.7,
-    reach: float = 2.0,
-    count: int = 101,
-) -> pd.DataFrame:
-    """Compute point spread functions and their Gaussians along the radius, for the three models.
-
-    Parameters
-    ----------
-    f_number, pitch : float
-        The camera.
-    wavelength, fill_factor, defocus, spherical : float
-        See `optics_table`.
-    reach : float, default 2
-        Largest radius in pixels.
-    count : int, default 101
-        Number of radii from 0.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per model and radius: ``model``, ``f_number``, ``pitch``, ``radius`` (pixels),
-        ``psf``, the mean over the circle, and ``gaussian``, both per square pixel for a point
-        spread function of integral 1; ``c`` and ``residual`` of the fit, see `GaussianFit`.
-    """
-    import pandas as pd
-
-    validation.number("reach", reach, above=0)
-    validation.integer("count", count, least=2)
-    radius = np.linspace(0.0, reach, count)
-    parts = []
-    for model in MODELS:
-        what = camera(model, wavelength, f_number, pitch, fill_factor, defocus, spherical)
-        fit = fit_camera(what)
-        gaussian = fit.height * np.exp(-0.5 * (radius / fit.blur) ** 2)
-        parts.append(
-            pd.DataFrame(
-                {
-                    "model": model,
-                    "f_number": float(f_number),
-                    "pitch": float(pitch),
-                    "radius": radius,
-                    "psf": psf_profile(what, radius * pitch) * pitch**2,
-                    "gaussian": gaussian * pitch**2,
-                    "c": fit.blur,
-                    "residual": fit.residual,
-                }
-            )
-        )
-    return pd.concat(parts, ignore_index=True)
-
-
-def _check_lists(**lists: Sequence[float]) -> None:
-    """Raise `InputError` for a list that is empty or holds something else than numbers above 0."""
-    for name, values in lists.items():
-        if len(values) == 0:
-            raise InputError(f"{name}: none were given; give numbers above 0")
-        for value in values:
-            validation.number(name, value, above=0)

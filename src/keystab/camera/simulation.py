@@ -8,31 +8,20 @@ shift and non-integer zoom is exact; only rotations by other than quarter turns 
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-import operator
 import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from keystab.camera.views import ViewSpec, effective_blur, to_reference, to_view
+from keystab.camera.views import ViewSpec, to_reference
 from keystab.errors import InputError
 from keystab.scalespace import cosine_series
 from keystab.utils import memory
+from keystab.utils.random import random_generator
 
-__all__ = [
-    "Scene",
-    "ViewSpec",
-    "effective_blur",
-    "random_generator",
-    "simulate",
-    "simulate_view",
-    "to_reference",
-    "to_view",
-]
+__all__ = ["Scene", "simulate", "simulate_view"]
 
 #: Samples of the auxiliary grid of a rotated view per standard deviation of the blur, and the
 #: least number of them per reference pixel, which matters where there is little or no blur.
@@ -181,39 +170,6 @@ def simulate(reference: Scene | ArrayLike, spec: ViewSpec) -> NDArray[np.float64
         draw = random_generator("camera noise", *seed)
         view = view + spec.noise * draw.standard_normal(spec.shape)
     return np.ascontiguousarray(view)
-
-
-def random_generator(*purpose: int | str) -> np.random.Generator:
-    """Random numbers that depend on what they are for, and on nothing else.
-
-    The generator (Philox) is keyed by SHA-256 of the purpose, so that results depend neither on the
-    order in which draws are made nor on how work is split into jobs.
-
-    Parameters
-    ----------
-    *purpose : int or str
-        Anything that names the draw: the study's seed, the set, the view. 1 and "1" differ.
-
-    Returns
-    -------
-    numpy.random.Generator
-
-    Raises
-    ------
-    TypeError
-        If a part is neither an integer nor a string. Floats are refused: a last digit that
-        differs would change everything.
-
-    Examples
-    --------
-    >>> random_generator("noise", 3).random() == random_generator("noise", 3).random()
-    True
-    >>> random_generator("noise", 3).random() == random_generator("noise", 4).random()
-    False
-    """
-    parts = [part if isinstance(part, str) else operator.index(part) for part in purpose]
-    digest = hashlib.sha256(json.dumps(parts).encode()).digest()
-    return np.random.Generator(np.random.Philox(key=int.from_bytes(digest[:16], "big")))
 
 
 def _grey_values(reference: ArrayLike) -> NDArray[Any]:

@@ -25,8 +25,8 @@ from keystab.detection import search_cosine, search_spline
 from keystab.detection.search_cosine import BandLimitedSearch
 from keystab.detection.search_spline import InterpolatedSearch
 from keystab.errors import InputError
+from keystab.scalespace.axis import Block
 from keystab.scalespace.dog import ScaleSpace, ranges
-from keystab.scalespace.operators import Block
 from keystab.utils import memory, validation
 from keystab.utils.progress import progress
 

@@ -35,8 +35,8 @@ from keystab.detection.search_scan import (
     scan,
     starts_of,
 )
+from keystab.scalespace.cosine_axis import CosineAxis, band_limited_basis
 from keystab.scalespace.dog import ScaleSpace
-from keystab.scalespace.operators import CosineAxis, band_limited_basis
 
 # Rows and columns of a block: long ones need fewer nodes per sample; all slices and the Gaussians
 # of a block stay in the cache of a core.

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from keystab.scalespace.operators import SplineAxis, columns_of, fill_rows
+from keystab.scalespace.spline_axis import SplineAxis, columns_of, fill_rows
 
 _NODES = 12
 

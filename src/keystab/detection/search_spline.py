@@ -44,7 +44,7 @@ from keystab.detection.search_scan import (
     starts_of,
 )
 from keystab.scalespace.dog import ScaleSpace
-from keystab.scalespace.operators import SplineAxis
+from keystab.scalespace.spline_axis import SplineAxis
 
 # Length of a block along either axis in standard deviations of 1.1 px.
 _LENGTH = 2.8

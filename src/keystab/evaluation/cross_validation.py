@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.camera.simulation import random_generator
 from keystab.errors import InputError
+from keystab.utils.random import random_generator
 
 Split = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
@@ -66,7 +66,7 @@ def folds(block: NDArray[np.intp], n_folds: int, *purpose: int | str) -> NDArray
     n_folds : int
         At least 2.
     *purpose : int or str
-        What the folds are for; nothing else decides (`keystab.camera.simulation.random_generator`).
+        What the folds are for; nothing else decides (`keystab.utils.random.random_generator`).
 
     Returns
     -------

@@ -114,7 +114,7 @@ def bootstrap_counts(n: int, n_resamples: int, *purpose: int | str) -> NDArray[n
     n_resamples : int
         Samples.
     *purpose : int or str
-        What the draw is for, see `keystab.camera.simulation.random_generator`.
+        What the draw is for, see `keystab.utils.random.random_generator`.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def bootstrap_counts(n: int, n_resamples: int, *purpose: int | str) -> NDArray[n
     >>> bootstrap_counts(5, 3, "example").sum(axis=1)
     array([5, 5, 5])
     """
-    from keystab.camera.simulation import random_generator
+    from keystab.utils.random import random_generator
 
     drawn = random_generator("bootstrap", *purpose).integers(0, max(n, 1), size=(n_resamples, n))
     drawn += n * np.arange(n_resamples)[:, None]

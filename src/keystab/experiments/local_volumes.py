@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.camera.simulation import random_generator
 from keystab.detection.extrema import extrema_of_array
 from keystab.detection.refinement import quadratic_model
 from keystab.errors import InputError
@@ -16,6 +15,7 @@ from keystab.evaluation.stability import label
 from keystab.matching.correspondence import SCALE_RATIO, SPACE_TOLERANCE
 from keystab.prediction.features import condition_numbers
 from keystab.scalespace.dog import ScaleSpace, scale_space
+from keystab.utils.random import random_generator
 
 HALF = 12
 """Samples on each side of the centre: cubes of 25 x 25 x 25."""

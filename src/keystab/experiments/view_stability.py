@@ -8,79 +8,20 @@ all views could have seen them, and matched there.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.camera.view_sets import in_common_field, to_common_frame
-from keystab.camera.views import ViewSpec
 from keystab.evaluation.intervals import Purpose, normal_half_width, wilson_interval
 from keystab.evaluation.localization import mean_precision
 from keystab.evaluation.stability import stability_curve
+from keystab.matching.common_range import CommonRange
 from keystab.matching.unique_keypoints import matches, unique_keypoints
 
 Labels = Mapping[str, Any]
 """What a table is about: columns of one value each, put before its own."""
-
-
-@dataclass(frozen=True)
-class CommonRange:
-    """What all views of a set could have seen.
-
-    Attributes
-    ----------
-    specs : sequence of ViewSpec
-        The views; the first one gives the common frame.
-    reference_shape : tuple of int
-        Height and width of the reference in pixels.
-    margin : float
-        Width of the margin of every view, in its pixels.
-    low, high : float
-        Scales, in pixels of the first view.
-    """
-
-    specs: Sequence[ViewSpec]
-    reference_shape: tuple[int, int]
-    margin: float
-    low: float
-    high: float = np.inf
-
-    def common(self, detections: pd.DataFrame, scale_column: str = "sigma") -> pd.DataFrame:
-        """Detections of the common field and range of scales, in the frame of the first view.
-
-        Parameters
-        ----------
-        detections : DataFrame
-            Columns ``view, y, x, sigma`` and `scale_column`.
-        scale_column : str
-            The scale that decides. For discrete extrema it is ``step_sigma``, the scale after one
-            unbounded quadratic step; see `keystab.matching.common_range.comparable`.
-
-        Returns
-        -------
-        DataFrame
-            Some rows of `detections`, with ``y, x, sigma`` and `scale_column` in the common frame.
-        """
-        table = detections.reset_index(drop=True)
-        view = table["view"].to_numpy()
-        y, x = table["y"].to_numpy(float, copy=True), table["x"].to_numpy(float, copy=True)
-        zoom = np.ones(len(table))
-        for number, spec in enumerate(self.specs):
-            here = view == number
-            y[here], x[here] = to_common_frame(
-                spec, self.specs[0], self.reference_shape, y[here], x[here]
-            )
-            zoom[here] = spec.step / self.specs[0].step
-        table = table.assign(y=y, x=x, sigma=table["sigma"] * zoom)
-        if scale_column != "sigma":
-            table[scale_column] = table[scale_column] * zoom
-        scale = table[scale_column]
-        keep = (scale >= self.low) & (scale <= self.high)
-        keep &= in_common_field(self.specs, self.reference_shape, self.margin, y, x)
-        return table[keep].reset_index(drop=True)
 
 
 class MatchedViews(NamedTuple):

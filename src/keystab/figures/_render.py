@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from keystab import __version__
+from keystab._version import __version__
 from keystab.errors import InputError
 from keystab.figures import style
 from keystab.utils.files import written_whole

@@ -44,7 +44,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     Parameters
     ----------
     tables : mapping
-        ``fig1``: the table of `keystab.scalespace.semigroup.semigroup_table`.
+        ``fig1``: the table of `keystab.experiments.semigroup_table.semigroup_table`.
     draft : bool
         Say on the figure that its numbers come from quick settings.
 

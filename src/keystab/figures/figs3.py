@@ -41,8 +41,8 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     Parameters
     ----------
     tables : mapping
-        ``figS3``: the table of `keystab.camera.optics.optics_table`; ``figS3_profiles``: that of
-        `keystab.camera.optics.profile_table`.
+        ``figS3``: the table of `keystab.experiments.camera_blur.optics_table`; ``figS3_profiles``: that of
+        `keystab.experiments.camera_blur.profile_table`.
     draft : bool
         Say on the figure that its numbers come from quick settings.
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from keystab.errors import InputError
 from keystab.io.checksums import verify
-from keystab.io.scale_space_store import attributes_of, open_scale_space, open_views
+from keystab.io.scale_space_store import open_scale_space
 from keystab.io.tables import read_table
+from keystab.io.view_store import open_views
+from keystab.io.zarr_groups import attributes_of
 from keystab.utils.memory import in_words
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from keystab import __version__
+from keystab._version import __version__
 from keystab.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "GROUP_NAME",
     "Kind",
+    "attributes_of",
     "new_array",
     "new_group",
     "open_array",
@@ -160,3 +161,22 @@ def open_dataset(path: str | os.PathLike[str], kind: Kind) -> xr.Dataset:
 
     _, folder = open_group(path, kind)
     return xr.open_zarr(folder, chunks=None, consolidated=False, zarr_format=3)
+
+
+__all__ = ["attributes_of"]
+
+
+def attributes_of(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read the attributes of a store of either kind; ``kind`` says which.
+
+    Parameters
+    ----------
+    path : path
+        Folder that `write_scale_space` or `write_views` wrote.
+
+    Raises
+    ------
+    InputError
+        If there is no such store, or chunks are missing from it.
+    """
+    return dict(open_group(path, None)[0].attrs)

@@ -10,9 +10,15 @@ here.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+
+from keystab.camera.common_field import in_common_field, to_common_frame
+from keystab.camera.views import ViewSpec
 
 
 def comparable(
@@ -65,3 +71,101 @@ def comparable(
         position = detections[axis].to_numpy()
         inside &= (position >= border) & (position <= size - 1 - border)
     return inside
+
+
+def common_scales(
+    specs: Sequence[ViewSpec],
+    sigma_min: float,
+    n_oct: int,
+    first_scale: float,
+    last_scale: float | None,
+) -> tuple[float, float]:
+    """Range of scales that all views of a set cover, in pixels of the first view.
+
+    Parameters
+    ----------
+    specs : sequence of ViewSpec
+        The views.
+    sigma_min : float
+        First scale of the scale-space of every view, in its pixels.
+    n_oct : int
+        Octaves of every scale-space.
+    first_scale : float
+        Lower end of the range of a single view, over `sigma_min`.
+    last_scale : float or None
+        Upper end of it, over `sigma_min`; none if None, unless the views have different zooms:
+        then the end of the last octave.
+
+    Returns
+    -------
+    low, high : float
+        ``low > high`` where there is no common range; `high` is infinite where there is no end.
+
+    Examples
+    --------
+    >>> specs = [ViewSpec(1.1, step, (9, 9)) for step in (10.0, 15.0)]
+    >>> low, high = common_scales(specs, 1.0, 2, 1.25, None)
+    >>> low, high
+    (1.875, 4.0)
+    """
+    zooms = [spec.step / specs[0].step for spec in specs]
+    if last_scale is None:
+        last_scale = 2.0**n_oct if max(zooms) > min(zooms) else float("inf")
+    return sigma_min * first_scale * max(zooms), sigma_min * last_scale * min(zooms)
+
+
+@dataclass(frozen=True)
+class CommonRange:
+    """What all views of a set could have seen.
+
+    Attributes
+    ----------
+    specs : sequence of ViewSpec
+        The views; the first one gives the common frame.
+    reference_shape : tuple of int
+        Height and width of the reference in pixels.
+    margin : float
+        Width of the margin of every view, in its pixels.
+    low, high : float
+        Scales, in pixels of the first view.
+    """
+
+    specs: Sequence[ViewSpec]
+    reference_shape: tuple[int, int]
+    margin: float
+    low: float
+    high: float = np.inf
+
+    def common(self, detections: pd.DataFrame, scale_column: str = "sigma") -> pd.DataFrame:
+        """Detections of the common field and range of scales, in the frame of the first view.
+
+        Parameters
+        ----------
+        detections : DataFrame
+            Columns ``view, y, x, sigma`` and `scale_column`.
+        scale_column : str
+            The scale that decides. For discrete extrema it is ``step_sigma``, the scale after one
+            unbounded quadratic step; see `keystab.matching.common_range.comparable`.
+
+        Returns
+        -------
+        DataFrame
+            Some rows of `detections`, with ``y, x, sigma`` and `scale_column` in the common frame.
+        """
+        table = detections.reset_index(drop=True)
+        view = table["view"].to_numpy()
+        y, x = table["y"].to_numpy(float, copy=True), table["x"].to_numpy(float, copy=True)
+        zoom = np.ones(len(table))
+        for number, spec in enumerate(self.specs):
+            here = view == number
+            y[here], x[here] = to_common_frame(
+                spec, self.specs[0], self.reference_shape, y[here], x[here]
+            )
+            zoom[here] = spec.step / self.specs[0].step
+        table = table.assign(y=y, x=x, sigma=table["sigma"] * zoom)
+        if scale_column != "sigma":
+            table[scale_column] = table[scale_column] * zoom
+        scale = table[scale_column]
+        keep = (scale >= self.low) & (scale <= self.high)
+        keep &= in_common_field(self.specs, self.reference_shape, self.margin, y, x)
+        return table[keep].reset_index(drop=True)

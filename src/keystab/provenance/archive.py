@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
-from keystab import __version__
+from keystab._version import __version__
 from keystab.errors import InputError
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.ro_crate import Item, crate_text

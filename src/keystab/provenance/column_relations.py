@@ -14,7 +14,7 @@ import numpy as np
 
 from keystab.errors import InputError
 from keystab.evaluation.intervals import wilson_interval
-from keystab.study.claims import evaluate
+from keystab.study.expressions import evaluate
 
 if TYPE_CHECKING:
     import pandas as pd

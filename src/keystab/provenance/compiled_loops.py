@@ -3,10 +3,11 @@
 numba keeps a compiled loop beside its module and compiles it again when that file changes, but not
 when a loop that it calls in another file does. A checkout that was updated would go on with the old
 one. The workflow and the tests keep theirs apart, see
-`keystab.provenance.code_digest.folder_of_loops`; this serves whoever imports the library from a
-folder that can be written to. Loops kept elsewhere, in NUMBA_CACHE_DIR or in numba's folder for
-packages that are only readable, are left alone, and an edit between the import and the first use is
-seen only if another one follows.
+`keystab.provenance.code_digest.folder_of_loops`; this serves whoever uses the library in a
+folder that can be written to: its public names, the command and stages forget when they are first
+used; an import alone changes nothing. Loops kept elsewhere, in NUMBA_CACHE_DIR or in numba's folder
+for packages that are only readable, are left alone, and an edit between the first use and that of a
+loop is seen only if another one follows.
 """
 
 from __future__ import annotations

@@ -176,7 +176,9 @@ def check_verdicts(run: Run, claims: Path, exact: bool) -> Check:
         Whether every bit has to be the same; else verdicts have to be, and texts may differ.
     """
     from keystab.io.tables import read_table
-    from keystab.study.claims import judge_all, read_claims, table_names, write_ledger
+    from keystab.study.claims import read_claims, table_names
+    from keystab.study.claims_report import write_ledger
+    from keystab.study.verdicts import judge_all
 
     if not claims.is_file():
         return Check("verdicts", "there are no claims here to judge")

@@ -17,16 +17,11 @@ import threadpoolctl
 from numba import njit
 
 from keystab.errors import InputError
+from keystab.scalespace.axis import AxisOperator, Block
+from keystab.scalespace.cosine_axis import CosineAxis, cosine_source
 from keystab.scalespace.neighbourhoods import cosine_neighbourhoods, spline_neighbourhoods
-from keystab.scalespace.operators import (
-    AxisOperator,
-    Block,
-    CosineAxis,
-    SplineAxis,
-    cosine_source,
-    spline_source,
-)
 from keystab.scalespace.sampling import OVERSAMPLINGS, Sampling, balanced_delta
+from keystab.scalespace.spline_axis import SplineAxis, spline_source
 from keystab.utils import memory
 
 # A tile of the store; searching for extrema uses flatter blocks (see `detection`).

@@ -11,7 +11,9 @@ import numpy as np
 import threadpoolctl
 from numba import njit
 
-from keystab.scalespace.operators import AxisOperator, CosineAxis, SplineAxis, fill_rows
+from keystab.scalespace.axis import AxisOperator
+from keystab.scalespace.cosine_axis import CosineAxis
+from keystab.scalespace.spline_axis import SplineAxis, fill_rows
 
 # Candidates handled at once in cosine mode: bounds the memory of their cosines.
 _BATCH = 256

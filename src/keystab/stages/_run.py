@@ -10,6 +10,7 @@ import gc
 import os
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,6 +39,10 @@ def stage(main: Main) -> Callable[..., int]:
 
     @functools.wraps(main)
     def command(argv: Sequence[str] | None = None) -> int:
+        if "NUMBA_CACHE_DIR" not in os.environ:
+            # Not a plain import: it changes no result, and what a stage imports is part of its
+            # fingerprint.
+            import_module("keystab.provenance.compiled_loops").forget_outdated()
         try:
             main(argv)
         except InputError as error:

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from keystab.camera.view_sets import windows_of_common_field
+from keystab.camera.common_field import windows_of_common_field
 from keystab.detection.stored_extrema import stored_extrema
 from keystab.detection.view_detector import Detector, Search, Window
 from keystab.io.scale_space_store import StoredScaleSpace
+from keystab.io.view_store import View, Views
 from keystab.scalespace.dog import ScaleSpace
-from keystab.stages._inputs import View, Views
 
 # Pixels around what all views have in common in which extrema are sought too.
 _RIM = 4.0

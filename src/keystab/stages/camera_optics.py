@@ -24,7 +24,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     _run.required(parser, "profiles", "table of profiles to write", type=Path)
     args = parser.parse_args(argv)
 
-    from keystab.camera.optics import optics_table, profile_table
+    from keystab.experiments.camera_blur import optics_table, profile_table
     from keystab.io.tables import write_table
 
     lens = (args.wavelength, args.fill_factor, args.defocus, args.spherical)

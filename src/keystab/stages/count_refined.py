@@ -27,8 +27,9 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.detection.refinement import accepted, positions
     from keystab.io.tables import read_table, write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling, balanced_delta
-    from keystab.stages._inputs import comparable_only, read_view
+    from keystab.stages._compared import comparable_only
 
     view = read_view(args.views, args.views_digest)
     octave = argparse.Namespace(**(vars(args) | {"last_scale": 2.0}))

@@ -24,7 +24,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     import pandas as pd
 
     from keystab.io.tables import write_table
-    from keystab.stages._inputs import read_view
+    from keystab.io.view_store import read_view
 
     parts = []
     for value, store, digest in zip(args.values, args.views, args.views_digest, strict=True):

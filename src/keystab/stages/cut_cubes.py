@@ -25,7 +25,8 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.experiments.local_volumes import cubes_around, dense_scale_space, drawn
     from keystab.io.tables import write_table
-    from keystab.stages._inputs import read_keypoints, read_view
+    from keystab.io.view_store import read_view
+    from keystab.stages._inputs import read_keypoints
 
     columns = ["keypoint", "y", "x", "sigma", "sign", "stability"]
     keypoints = read_keypoints(args.keypoints, columns)

@@ -21,8 +21,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     import pandas as pd
 
     from keystab.io.checksums import verify
-    from keystab.io.scale_space_store import open_views, view
     from keystab.io.tables import write_table
+    from keystab.io.view_store import open_views, view
 
     verify(args.views, args.views_digest)
     views = open_views(args.views)

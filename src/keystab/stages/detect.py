@@ -32,8 +32,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.io.checksums import verify
     from keystab.io.scale_space_store import StoredScaleSpace
     from keystab.io.tables import write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.dog import scale_space
-    from keystab.stages._inputs import read_view
 
     view = read_view(args.views, args.views_digest)
     space = scale_space(

@@ -25,8 +25,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.detection.detector import extrema_table
     from keystab.detection.extrema import extrema_and_cubes
     from keystab.io.tables import write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.dog import scale_space
-    from keystab.stages._inputs import read_view
 
     view = read_view(args.views, args.views_digest)
     tables = []

@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.detection.view_detector import Detector, detect_in_view
     from keystab.io.tables import write_table
-    from keystab.stages._inputs import read_view
+    from keystab.io.view_store import read_view
     from keystab.utils.progress import progress
 
     view = read_view(args.views, args.views_digest)

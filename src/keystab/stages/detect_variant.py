@@ -32,8 +32,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.detection.extrema import discrete_extrema
     from keystab.detection.single_precision import quantised, single_precision_extrema
     from keystab.io.tables import write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.dog import scale_space
-    from keystab.stages._inputs import read_view
     from keystab.utils.progress import progress
 
     view = read_view(args.views, args.views_digest)

@@ -30,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.detection.view_detector import detect_in_view
     from keystab.io.checksums import verify
     from keystab.io.tables import write_table
-    from keystab.stages._inputs import read_views
+    from keystab.io.view_store import read_views
     from keystab.stages._scale_spaces import search_of_stores, searched_windows, view_detector
     from keystab.utils.progress import progress
 

@@ -22,7 +22,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.io.pictures import read_picture
     from keystab.io.tables import write_table
-    from keystab.stages._inputs import read_views
+    from keystab.io.view_store import read_views
     from keystab.truth.scene_extrema import scene_extrema
 
     spec = read_views(args.views, args.views_digest).specs[0]

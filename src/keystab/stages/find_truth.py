@@ -19,7 +19,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     args = parser.parse_args(argv)
 
     from keystab.io.tables import write_table
-    from keystab.stages._inputs import read_view
+    from keystab.io.view_store import read_view
     from keystab.truth.true_extrema import true_extrema
 
     view = read_view(args.views, args.views_digest)

@@ -20,7 +20,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     args = parser.parse_args(argv)
 
     from keystab.io.tables import read_table
-    from keystab.study.claims import judge_all, read_claims, table_names, tally, write_ledger
+    from keystab.study.claims import read_claims, table_names
+    from keystab.study.claims_report import write_ledger
+    from keystab.study.verdicts import judge_all, tally
 
     claims = read_claims(args.claims)
     tables = {name: read_table(args.tables / f"{name}.csv") for name in table_names(claims)}

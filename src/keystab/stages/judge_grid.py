@@ -23,7 +23,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     import pandas as pd
 
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._inputs import judged_in_octave, read_view
+    from keystab.io.view_store import read_view
+    from keystab.stages._against_truth import judged_in_octave
 
     view, truth = read_view(args.views, args.views_digest), read_table(args.truth)
     rows = [

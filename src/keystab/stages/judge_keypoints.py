@@ -32,7 +32,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.evaluation.stability import label
     from keystab.io.tables import read_table, write_table
     from keystab.prediction.features import DIRECTIONS
-    from keystab.stages._inputs import read_keypoints, tolerances
+    from keystab.stages._compared import tolerances
+    from keystab.stages._inputs import read_keypoints
 
     keypoints = read_keypoints(args.keypoints, ["keypoint", "y", "x", "sigma", "sign", "stability"])
     low, high = (args.sigma_min * end for end in (args.first_scale, args.last_scale))

@@ -26,10 +26,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     import pandas as pd
 
     from keystab.detection.refinement import MOST_MODELS, trace
-    from keystab.evaluation.recall_precision import kept_and_lost
+    from keystab.experiments.refinement_choices import kept_and_lost
     from keystab.io.tables import read_table, write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.dog import scale_space
-    from keystab.stages._inputs import compared, read_view, tolerances
+    from keystab.stages._compared import compared, tolerances
 
     view, truth = read_view(args.views, args.views_digest), read_table(args.truth)
     iterations = [*range(1, args.most_iterations + 1), MOST_MODELS]

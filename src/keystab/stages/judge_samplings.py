@@ -27,8 +27,9 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.detection.refinement import refined_table
     from keystab.io.tables import read_table, write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling, balanced_delta
-    from keystab.stages._inputs import judged_in_octave, read_view
+    from keystab.stages._against_truth import judged_in_octave
 
     view, truth = read_view(args.views, args.views_digest), read_table(args.truth)
     rows = []

@@ -35,9 +35,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.detection.refinement import refined_keypoints
     from keystab.evaluation.recall_precision import mean_over_views
-    from keystab.experiments.view_stability import CommonRange
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._inputs import read_views, tolerances
+    from keystab.io.view_store import read_views
+    from keystab.matching.common_range import CommonRange
+    from keystab.stages._compared import tolerances
 
     seen_from = read_views(args.views, args.views_digest).specs[0]
     scene = read_table(args.truth)

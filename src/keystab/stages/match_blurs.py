@@ -28,7 +28,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.errors import InputError
     from keystab.experiments.blur_errors import blur_error_table
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._inputs import common_range, read_views, same_options
+    from keystab.io.view_store import read_views
+    from keystab.stages._compared import common_range, same_options
 
     views = read_views(args.views, args.views_digest)
     blurs = [spec.blur for spec in views.specs]

@@ -30,8 +30,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.experiments.sampling_stability import sampling_counts
     from keystab.io.tables import write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling, balanced_delta
-    from keystab.stages._inputs import comparable_only, read_extrema, read_view, same_options
+    from keystab.stages._compared import comparable_only, same_options
+    from keystab.stages._inputs import read_extrema
 
     view = read_view(args.views, args.views_digest)
     grid, balanced = read_extrema(args.grid), read_extrema(args.samplings)

@@ -29,7 +29,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.detection.refinement import refined_keypoints
     from keystab.experiments.kappa_stability import kappa_tables
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._inputs import read_view, same_options
+    from keystab.io.view_store import read_view
+    from keystab.stages._compared import same_options
 
     view = read_view(args.views, args.views_digest)
     keypoints = refined_keypoints(

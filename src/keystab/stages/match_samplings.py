@@ -33,8 +33,10 @@ def main(argv: Sequence[str] | None = None) -> None:
         summary,
     )
     from keystab.io.tables import write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import balanced_delta
-    from keystab.stages._inputs import comparable_only, read_extrema, read_view, same_options
+    from keystab.stages._compared import comparable_only, same_options
+    from keystab.stages._inputs import read_extrema
 
     view = read_view(args.views, args.views_digest)
     extrema = read_extrema(args.samplings)

@@ -31,7 +31,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.detection.sift_filters import passes_filters
     from keystab.experiments.view_stability import count_table, curve_table, match_views
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._inputs import common_range, read_views, same_options
+    from keystab.io.view_store import read_views
+    from keystab.stages._compared import common_range, same_options
 
     views = read_views(args.views, args.views_digest)
     everywhere, same = common_range(views, args), same_options(args)

@@ -41,7 +41,8 @@ def main(argv: Sequence[str] | None = None) -> None:
         scale_table,
     )
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._inputs import common_range, read_views, same_options
+    from keystab.io.view_store import read_views
+    from keystab.stages._compared import common_range, same_options
 
     same = same_options(args)
     curves, counts, scales = [], [], []

@@ -32,8 +32,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.experiments.sampling_stability import change_counts, floor_summary, match_samplings
     from keystab.experiments.view_stability import labelled
     from keystab.io.tables import read_table, write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import balanced_delta
-    from keystab.stages._inputs import comparable_only, read_view, same_options
+    from keystab.stages._compared import comparable_only, same_options
 
     same = same_options(args)
     steps = {n_spo: balanced_delta(n_spo, args.kappa, args.sigma_min) for n_spo in args.n_spo}

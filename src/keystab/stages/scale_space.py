@@ -21,8 +21,8 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.io.checksums import write_seal
     from keystab.io.scale_space_store import write_scale_space
+    from keystab.io.view_store import read_view
     from keystab.scalespace.dog import scale_space
-    from keystab.stages._inputs import read_view
 
     view = read_view(args.views, args.views_digest)
     space = scale_space(

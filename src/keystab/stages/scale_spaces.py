@@ -20,7 +20,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.io.checksums import write_seal
     from keystab.io.scale_space_store import write_scale_space
-    from keystab.stages._inputs import read_views
+    from keystab.io.view_store import read_views
     from keystab.stages._scale_spaces import store_of, view_detector
 
     views = read_views(args.views, args.views_digest)

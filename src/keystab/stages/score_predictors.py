@@ -34,14 +34,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     from keystab.experiments.predictor_scores import described, score_predictors
     from keystab.io.tables import read_table, write_table
+    from keystab.io.view_store import read_view
     from keystab.scalespace.continuous_dog import DogSeries
-    from keystab.stages._inputs import (
-        compared,
-        read_extrema,
-        read_keypoints,
-        read_view,
-        same_options,
-    )
+    from keystab.stages._compared import compared, same_options
+    from keystab.stages._inputs import read_extrema, read_keypoints
     from keystab.utils.progress import progress
 
     ends = (args.sigma_min * args.first_scale, args.sigma_min * args.end)

@@ -23,8 +23,8 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     import numpy as np
 
+    from keystab.experiments.semigroup_table import semigroup_table
     from keystab.io.tables import write_table
-    from keystab.scalespace.semigroup import semigroup_table
 
     # Rounded, so that 0.7 is 0.7 and not 0.7000000000000001.
     sigmas = np.linspace(args.sigma_from, args.sigma_to, args.sigma_count).round(12)

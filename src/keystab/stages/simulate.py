@@ -38,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.errors import InputError
     from keystab.io.checksums import write_seal
     from keystab.io.pictures import read_with_digest
-    from keystab.io.scale_space_store import write_views
+    from keystab.io.view_store import write_views
 
     picture, digest = read_with_digest(args.reference)
     if args.reference_sha256 not in (None, digest):

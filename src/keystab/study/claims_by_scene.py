@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from keystab.errors import InputError
 from keystab.study import settings
-from keystab.study.claims import FIELDS, UNTESTED, VERDICTS, cell
+from keystab.study.claims_report import FIELDS, cell
+from keystab.study.verdicts import UNTESTED, VERDICTS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,7 +96,7 @@ def missing(found: Sequence[Source], made: str) -> list[str]:
 
 
 def read_ledger(path: Path | str) -> pd.DataFrame:
-    """Read a ledger that `keystab.study.claims.write_ledger` wrote as a table; empty texts are ''.
+    """Read a table of `keystab.study.claims_report.write_ledger`; empty texts are ''.
 
     Raises
     ------
@@ -113,7 +114,8 @@ def side_by_side(ledgers: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     Parameters
     ----------
     ledgers : mapping
-        Ledger of each picture, see `keystab.study.claims.to_table`, in the order of the columns.
+        Ledger of each picture, see `keystab.study.claims_report.to_table`, in the order of the
+        columns.
 
     Returns
     -------

@@ -19,13 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 from keystab.camera.simulation import Scene, simulate
 from keystab.camera.views import ViewSpec, to_reference, to_view
 from keystab.scalespace.continuous_dog import DogSeries
-from keystab.truth.true_extrema import (
+from keystab.truth.newton import folded
+from keystab.truth.seeds import (
     SEED_SAMPLINGS,
     SEEDS_BEYOND,
     Seeds,
-    check_scales,
-    extrema_from,
-    folded,
     growing,
     joined,
     listed,
@@ -33,6 +31,7 @@ from keystab.truth.true_extrema import (
     seeds_of,
     seeds_of_first_slice,
 )
+from keystab.truth.true_extrema import check_scales, extrema_from
 from keystab.utils import validation
 
 __all__ = ["scene_extrema"]

@@ -1,31 +1,18 @@
-"""Oversampling and Gaussian blur of one image axis as one matrix.
+"""Rows of L for a cubic B-spline through the pixels (section 2.3 of the paper).
 
-Oversampling and blur are linear and separable, so that along one axis "interpolate on the fine
-grid, then blur by a Gaussian" is a matrix L(blur) with one row per fine sample. A blurred fine
-image is ``L_y C L_x^T`` with C the source of the interpolant. Only the rows of a tile are ever
-built, and of these only the columns that matter.
-
-Two interpolants of the input image are offered (section 2.3 of the paper uses the first):
-
-``spline``
-    A cubic B-spline, sampled on the fine grid, then blurred by the discrete cosine transform of
-    that grid. The source is the array of spline coefficients. The spline is local and so is the
-    Gaussian: a row has some tens of columns, whatever the size of the image.
-``cosine``
-    The finite cosine series that the half-sample symmetric image is. The source is the array of
-    its coefficients; blur is a multiplication, exact for the continuous Gaussian. Rows are not
-    local: a column is a frequency.
+The spline is sampled on the fine grid, then blurred by the discrete cosine transform of that grid.
+The source is the array of spline coefficients. The spline is local and so is the Gaussian: a row
+has some tens of columns, whatever the size of the image.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from keystab.scalespace import cosine_series
+from keystab.scalespace.axis import Block
 
 # Kernel values below this do not reach the last digit of a blurred image in [0, 1]; rounding of the
 # transform that makes the kernel stays below it.
@@ -44,52 +31,6 @@ _LOCAL_BLUR, _LOCAL_REACH = 2.9, 8.6
 # Half-sample mirror of the spline coefficients on either side, so that the four columns of a row
 # are always neighbours.
 _PADDING = 2
-
-
-class AxisOperator(Protocol):
-    """Rows of L(blur) for one axis and several blurs."""
-
-    def block(self, start: int, stop: int) -> Block:
-        """Rows `start` to `stop` for every blur."""
-
-
-class Block(NamedTuple):
-    """Rows of L for a range of fine samples, ``L(blur) = expand @ factor(blur)``.
-
-    The factors of all blurs lie one behind the other in memory, so that compiled code can go
-    through them.
-
-    Attributes
-    ----------
-    expand : ndarray, shape (n_rows, rank), or None
-        What all blurs have in common; None stands for the identity.
-    rank : int
-        Rows of every factor.
-    first : ndarray of int, shape (n_blurs,)
-        The first column of the source that counts for each blur.
-    offset : ndarray of int, shape (n_blurs + 1,)
-        Where the entries of each factor begin.
-    entries : ndarray
-        Entries of all factors, row by row.
-    """
-
-    expand: np.ndarray | None
-    rank: int
-    first: np.ndarray
-    offset: np.ndarray
-    entries: np.ndarray
-
-    @classmethod
-    def of(cls, expand: np.ndarray | None, first: list[int], factors: list[np.ndarray]) -> Block:
-        """Put factors of one height behind each other."""
-        sizes = [factor.size for factor in factors]
-        offset = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-        entries = np.concatenate([factor.ravel() for factor in factors])
-        return cls(expand, len(factors[0]), np.array(first, dtype=np.int64), offset, entries)
-
-    def factor(self, blur: int) -> np.ndarray:
-        """Factor of one blur, shape (rank, n_columns)."""
-        return self.entries[self.offset[blur] : self.offset[blur + 1]].reshape(self.rank, -1)
 
 
 class SplineAxis:
@@ -127,7 +68,7 @@ class SplineAxis:
         self.rows = with_tables(dense, np.flatnonzero(rings), self.n_columns)
 
     def block(self, start: int, stop: int) -> Block:
-        """See `AxisOperator.block`."""
+        """See `keystab.scalespace.axis.AxisOperator.block`."""
         firsts, factors = [], []
         room = np.empty((stop - start, self.n_columns))
         for blur in range(self.rows.reach.size):
@@ -135,44 +76,6 @@ class SplineAxis:
             firsts.append(first)
             factors.append(room[:, :width].copy())
         return Block.of(None, firsts, factors)
-
-
-class CosineAxis:
-    """Evaluation of the input's own cosine series after a continuous Gaussian blur.
-
-    Parameters
-    ----------
-    n_samples, n_pixels, delta_min, stride, blurs
-        As for `SplineAxis`.
-    """
-
-    def __init__(
-        self, n_samples: int, n_pixels: int, delta_min: float, stride: int, blurs: np.ndarray
-    ) -> None:
-        self.n_pixels = n_pixels
-        self.spacing = delta_min * stride
-        self.gains = np.array([cosine_series.gaussian(n_pixels, blur) for blur in blurs])
-        self.n_frequencies = np.array([cosine_series.significant(n_pixels, blur) for blur in blurs])
-
-    def block(self, start: int, stop: int) -> Block:
-        """See `AxisOperator.block`; the columns are the lowest frequencies.
-
-        On a short interval, functions with a band limit of half a cycle per pixel span a space
-        of few dimensions, about one per pixel and a dozen more. Its basis is the same for all
-        blocks of one length.
-        """
-        expand = band_limited_basis(stop - start, self.spacing)
-        rows = self.basis(np.arange(start, stop))
-        common = rows if expand is None else expand.T @ rows
-        factors = [
-            common[:, :count] * gain[:count]
-            for count, gain in zip(self.n_frequencies, self.gains, strict=True)
-        ]
-        return Block.of(expand, [0] * len(factors), factors)
-
-    def basis(self, rows: np.ndarray, count: int | None = None) -> np.ndarray:
-        """Cosines of the lowest frequencies at fine samples, shape rows.shape + (count,)."""
-        return cosine_series.basis(np.asarray(rows) * self.spacing, self.n_pixels, count)
 
 
 def spline_source(image: np.ndarray) -> np.ndarray:
@@ -202,13 +105,6 @@ def _filter_splines(values: np.ndarray, axis: int) -> None:
     for start in range(0, along.shape[1], 256):
         part = along[:, start : start + 256]
         part[:] = solve_banded((1, 1), bands, part)
-
-
-def cosine_source(image: np.ndarray) -> np.ndarray:
-    """Cosine series coefficients of an image, without the constant term."""
-    a = cosine_series.coefficients(image)
-    a[0, 0] = 0.0
-    return a
 
 
 def spline_rows(n_samples: int, n_pixels: int, delta_min: float) -> tuple[np.ndarray, np.ndarray]:
@@ -276,35 +172,6 @@ def cosine_domain_kernel(n_samples: int, blur: float) -> np.ndarray:
         kernel = kernel[: n_samples + 1]
     reach = int(np.flatnonzero(np.abs(kernel) > _NEGLIGIBLE)[-1])
     return np.ascontiguousarray(kernel[: reach + 1])
-
-
-@lru_cache(maxsize=16)
-def band_limited_basis(n_samples: int, spacing: float, faint: float = 1e-16) -> np.ndarray | None:
-    """Orthonormal basis of band-limited functions on an interval.
-
-    Parameters
-    ----------
-    n_samples : int
-        Samples of the interval.
-    spacing : float
-        Their distance in pixels; the band limit is half a cycle per pixel.
-    faint : float
-        Singular value, of the largest, below which a direction is left out.
-
-    Returns
-    -------
-    ndarray, shape (n_samples, rank), or None
-        Columns that span every such function, by default to the last digit; None where that takes
-        about as many as there are samples.
-    """
-    span = (n_samples - 1) * spacing
-    # Frequencies dense enough that the waves between them add nothing new to the interval.
-    frequency = np.linspace(0.0, np.pi, int(4 * span) + 64)
-    phase = np.multiply.outer((np.arange(n_samples) - (n_samples - 1) / 2) * spacing, frequency)
-    waves = np.hstack([np.cos(phase), np.sin(phase)])
-    left, singular, _ = np.linalg.svd(waves, full_matrices=False)
-    rank = int((singular > faint * singular[0] * np.sqrt(n_samples)).sum())
-    return np.ascontiguousarray(left[:, :rank]) if rank < 0.7 * n_samples else None
 
 
 class MirroredSplines(NamedTuple):

@@ -28,7 +28,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.scalespace.continuous_dog import DogSeries, Jets
-from keystab.truth.true_extrema import Seeds, along_curve, climbed, extrema_from, folded, joined
+from keystab.truth.newton import climbed, folded
+from keystab.truth.seeds import Seeds, along_curve, joined
+from keystab.truth.true_extrema import extrema_from
 
 __all__ = ["SliceExtrema", "critical_balance", "crossings", "slice_extrema"]
 

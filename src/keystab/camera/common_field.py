@@ -1,0 +1,139 @@
+"""Where a place of one view lies in another, and what all views of a set show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from keystab.camera.views import ViewSpec, to_reference, to_view
+
+
+def to_common_frame(
+    spec: ViewSpec, first: ViewSpec, reference_shape: tuple[int, int], y: ArrayLike, x: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where positions of a view lie in the first view of its set.
+
+    Parameters
+    ----------
+    spec, first : ViewSpec
+        The view, and the first one.
+    reference_shape : tuple of int
+        Height and width of the reference in pixels.
+    y, x : array_like
+        Positions in pixels of the view.
+
+    Returns
+    -------
+    y, x : ndarray of float64
+        Positions in pixels of the first view. Scales there are longer by
+        ``spec.step / first.step``.
+
+    Examples
+    --------
+    >>> first, second = (ViewSpec(1.1, step, (9, 9)) for step in (10.0, 20.0))
+    >>> y, x = to_common_frame(second, first, (100, 100), 4, 5)
+    >>> float(y), float(x)
+    (4.0, 6.0)
+    """
+    return to_view(first, reference_shape, *to_reference(spec, reference_shape, y, x))
+
+
+def in_common_field(
+    specs: Sequence[ViewSpec],
+    reference_shape: tuple[int, int],
+    margin: float,
+    y: ArrayLike,
+    x: ArrayLike,
+) -> NDArray[np.bool_]:
+    """Whether positions lie inside the margin of every view, and on the reference.
+
+    Parameters
+    ----------
+    specs : sequence of ViewSpec
+        The views; positions are in the frame of the first one.
+    reference_shape : tuple of int
+        Height and width of the reference in pixels.
+    margin : float
+        Width of the margin around the centres of a view's outermost pixels, in its pixels.
+    y, x : array_like
+        Positions in pixels of the first view.
+
+    Returns
+    -------
+    ndarray of bool
+
+    Examples
+    --------
+    >>> specs = [ViewSpec(1.1, 10.0, (20, 20), (0.0, shift)) for shift in (0.0, 2.0)]
+    >>> in_common_field(specs, (200, 200), 3, [10.0, 10.0], [4.0, 5.5]).tolist()
+    [False, True]
+    """
+    there = to_reference(specs[0], reference_shape, y, x)
+    inside = np.ones(np.broadcast(*there).shape, dtype=bool)
+    for position, size in zip(there, reference_shape, strict=True):
+        inside &= (position >= 0) & (position <= size - 1)
+    for spec in specs:
+        for position, size in zip(to_view(spec, reference_shape, *there), spec.shape, strict=True):
+            inside &= (position >= margin) & (position <= size - 1 - margin)
+    return inside
+
+
+def common_field_is_empty(
+    specs: Sequence[ViewSpec], reference_shape: tuple[int, int], margin: float
+) -> bool:
+    """Whether none of 65 x 65 positions of the first view lies in the field of all views."""
+    y, x = (np.linspace(0, size - 1, 65) for size in specs[0].shape)
+    return not in_common_field(specs, reference_shape, margin, y[:, None], x[None, :]).any()
+
+
+def windows_of_common_field(
+    specs: Sequence[ViewSpec], reference_shape: tuple[int, int], margin: float
+) -> list[tuple[float, float, float, float]]:
+    """Smallest upright rectangle of each view that holds what all views have in common.
+
+    Parameters
+    ----------
+    specs, reference_shape, margin
+        See `in_common_field`.
+
+    Returns
+    -------
+    list of (float, float, float, float)
+        First and last row, first and last column, in pixels of each view; empty ranges where
+        nothing is common.
+
+    Examples
+    --------
+    >>> specs = [ViewSpec(1.1, 10.0, (20, 20), (0.0, shift)) for shift in (0.0, 2.0)]
+    >>> windows_of_common_field(specs, (200, 200), 3)
+    [(3.0, 16.0, 5.0, 16.0), (3.0, 16.0, 3.0, 14.0)]
+    """
+    last_y, last_x = (size - 1.0 for size in reference_shape)
+    field = np.array([[0.0, 0.0], [0.0, last_x], [last_y, last_x], [last_y, 0.0]])
+    for spec in specs:
+        for axis, size in enumerate(spec.shape):
+            for sign, limit in ((1.0, margin), (-1.0, -(size - 1 - margin))):
+                position = to_view(spec, reference_shape, *field.T)[axis]
+                field = _cut(field, sign * position - limit)
+    if not len(field):
+        return [(0.0, -1.0, 0.0, -1.0)] * len(specs)
+    windows = []
+    for spec in specs:
+        y, x = (np.round(part, 9) for part in to_view(spec, reference_shape, *field.T))
+        windows.append((float(y.min()), float(y.max()), float(x.min()), float(x.max())))
+    return windows
+
+
+def _cut(corners: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cut a convex polygon where a linear function of its corners becomes negative."""
+    kept = []
+    for k in range(len(corners)):
+        after = (k + 1) % len(corners)
+        if height[k] >= 0:
+            kept.append(corners[k])
+        if height[k] * height[after] < 0:
+            share = height[k] / (height[k] - height[after])
+            kept.append(corners[k] + share * (corners[after] - corners[k]))
+    return np.array(kept).reshape(-1, 2)

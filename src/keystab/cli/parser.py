@@ -1,0 +1,294 @@
+"""The command line of `keystab`: commands, their arguments, and what runs each."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from contextlib import suppress
+from pathlib import Path
+from typing import NoReturn
+
+from keystab._version import __version__
+from keystab.cli.library import blur, detect, inspect, simulate, truth
+from keystab.cli.study import archive, reference, verify, whence
+
+BAD_INPUT = 2
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that reports an error in one line, without its usage."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Parser of all commands."""
+    parser = _Parser(
+        prog="keystab",
+        description="Simulated views, scale-space keypoints, and what files hold.",
+    )
+    parser.add_argument("--version", action="version", version=f"keystab {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _simulate_arguments(
+        commands.add_parser(
+            "simulate",
+            help="take a view of a picture with a simulated camera",
+            description="Blur a picture and sample it, as a camera that sees it would: exactly, "
+            "at any zoom, shift and rotation. The view is centred on the picture, which goes on "
+            "beyond its border as its mirror image.",
+        )
+    )
+    _detect_arguments(
+        commands.add_parser(
+            "detect",
+            help="detect the keypoints of a picture",
+            description="Detect the extrema of the difference-of-Gaussians scale-space of a "
+            "picture, without any filter of contrast or edges.",
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        )
+    )
+    _blur_arguments(
+        commands.add_parser(
+            "blur",
+            help="fit a Gaussian to a picture of a point spread function",
+            description="Say what camera blur a measured point spread function has: the standard "
+            "deviation of the Gaussian that fits its picture best in least squares, for "
+            "--camera-blur of keystab detect.",
+        )
+    )
+    _truth_arguments(
+        commands.add_parser(
+            "truth",
+            help="find the true extrema of a picture",
+            description="Find all extrema of the continuous difference-of-Gaussians scale-space "
+            "of a picture, to some twelve digits: what a detector at any sampling should find.",
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        )
+    )
+    to = commands.add_parser(
+        "inspect",
+        help="say what a store or a table holds",
+        description="Say in words what a stored scale-space, a stored set of views or a table of "
+        "keypoints holds.",
+    )
+    to.add_argument("path", metavar="PATH", type=Path, help="store, .csv or .parquet table")
+    to.set_defaults(run=inspect)
+    _study_commands(commands)
+    return parser
+
+
+def _study_commands(commands: argparse._SubParsersAction[_Parser]) -> None:
+    """Add the commands that are about the study; they are given in the project's folder."""
+    to = commands.add_parser(
+        "whence",
+        help="say where a figure of the study comes from",
+        description="Say what drew a figure, from which tables, what these were made from, and how "
+        "to make it again; and whether files and code are still the same here.",
+    )
+    to.add_argument("figure", metavar="FIGURE", type=Path, help="figure of the study, PDF or PNG")
+    to.set_defaults(run=whence)
+    to = commands.add_parser(
+        "archive",
+        help="pack a finished run of the study into one file",
+        description="Write {results}/archive/keystab-VERSION.zip: figures, tables, verdicts, code, "
+        "settings, environment.lock, Snakemake's records, costs and an RO-Crate.",
+    )
+    _configfile_argument(to)
+    to.set_defaults(run=archive)
+    to = commands.add_parser(
+        "reference",
+        help="copy the small results of a finished run to results/reference",
+        description="Copy tables, verdicts and PNG figures, with their digests and what they were "
+        "made by, to results/reference, to be committed.",
+    )
+    _configfile_argument(to)
+    to.set_defaults(run=reference)
+    to = commands.add_parser(
+        "verify",
+        help="check an archive of the study, or the results that are here",
+        description="Check an archive against the code, settings and lock file here, without "
+        "computing anything; without an archive, the results that are here, and compare them with "
+        "results/reference. With --recompute, compute figures again and compare all numbers.",
+    )
+    to.add_argument("archive", metavar="ARCHIVE", type=Path, nargs="?", help="zip file to check")
+    _configfile_argument(to)
+    to.add_argument(
+        "--recompute", nargs="+", metavar="FIGURE",
+        help="figures to compute again, such as fig5, or all; needs the time and disk of the study",
+    )  # fmt: skip
+    to.add_argument("--cores", type=int, default=1, metavar="N", help="jobs at a time (default 1)")
+    for name, value, what in (("rtol", 1e-6, "relative"), ("atol", 1e-9, "absolute")):
+        to.add_argument(
+            f"--{name}", type=float, default=value, metavar="T",
+            help=f"{what} tolerance for numbers where software or processor differ "
+            f"(default {value:g}); where both are the same, every bit counts",
+        )  # fmt: skip
+    to.set_defaults(run=verify)
+
+
+def _configfile_argument(to: argparse.ArgumentParser) -> None:
+    to.add_argument(
+        "--configfile", nargs="+", default=[], metavar="FILE",
+        help="settings of the run, laid over config/config.yaml as for snakemake",
+    )  # fmt: skip
+
+
+def _simulate_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=simulate)
+    to.add_argument("picture", metavar="PICTURE", type=Path, help="the scene: PNG, TIFF, JPEG, npy")
+    to.add_argument(
+        "out", metavar="OUT", type=Path,
+        help="view to write: .png (16 bits, clipped), .tiff (float32) or .npy (float64)",
+    )  # fmt: skip
+    to.add_argument(
+        "--blur", type=float, required=True, metavar="C",
+        help="camera blur: standard deviation of its Gaussian in view pixels",
+    )  # fmt: skip
+    to.add_argument(
+        "--step", type=float, required=True, metavar="S",
+        help="picture pixels per view pixel; the larger, the further away the camera",
+    )  # fmt: skip
+    to.add_argument(
+        "--shape", type=int, nargs=2, metavar=("H", "W"),
+        help="height and width of the view in pixels; by default all of the picture",
+    )  # fmt: skip
+    to.add_argument(
+        "--shift", type=float, nargs=2, default=(0.0, 0.0), metavar=("Y", "X"),
+        help="move the camera down and right by so many view pixels",
+    )  # fmt: skip
+    to.add_argument(
+        "--rotation", type=float, default=0.0, metavar="DEG",
+        help="turn the camera counter-clockwise about its centre, degrees",
+    )  # fmt: skip
+    to.add_argument(
+        "--noise", type=float, default=0.0, metavar="SD",
+        help="standard deviation of white noise, in units of the range [0, 1]",
+    )  # fmt: skip
+    to.add_argument(
+        "--seed", type=_seed, help="number or word that decides the noise; needed with --noise"
+    )
+
+
+def _detect_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=detect)
+    to.add_argument("picture", metavar="PICTURE", type=Path, help="PNG, TIFF, JPEG or npy")
+    to.add_argument(
+        "-o", "--output", metavar="OUT", type=Path, default=argparse.SUPPRESS,
+        help="table to write, .csv or .parquet; standard output if not given",
+    )  # fmt: skip
+    flags = [
+        to.add_argument(
+            "--camera-blur", type=float, required=True, metavar="C", default=argparse.SUPPRESS,
+            help="Gaussian blur that the picture already has, pixels",
+        ),
+        to.add_argument("--n-spo", type=int, default=3, metavar="N", help="scales per octave"),
+        to.add_argument(
+            "--delta-min", type=float, metavar="D",
+            help="distance of fine samples, pixels; balanced with the scales if not given",
+        ),
+        to.add_argument("--sigma-min", type=float, default=1.1, metavar="S", help="first scale"),
+        to.add_argument(
+            "--kappa", type=float, default=2 ** (1 / 3), metavar="K",
+            help="ratio of the two blurs of the difference of Gaussians",
+        ),
+        to.add_argument(
+            "--oversampling", choices=("spline", "cosine"), default="spline",
+            help="interpolant of the picture",
+        ),
+        to.add_argument(
+            "--epsilon", type=float, default=0.0, metavar="E",
+            help="least difference of an extremum to each of its 26 neighbours",
+        ),
+        to.add_argument(
+            "--refine", action=argparse.BooleanOptionalAction, default=True,
+            help="refine extrema by quadratic models, and discard those where that fails",
+        ),
+        to.add_argument(
+            "--max-offset", type=float, default=0.6, metavar="M",
+            help="largest accepted offset of a model, grid steps; inf for no limit",
+        ),
+        to.add_argument(
+            "--max-iterations", type=_count, default=2, metavar="N",
+            help="most models for one extremum; inf for no limit",
+        ),
+        to.add_argument(
+            "--scale-moves", action=argparse.BooleanOptionalAction, default=True,
+            help="let a further model be made at another scale",
+        ),
+        to.add_argument(
+            "--move", choices=("nearest", "unit_step"), default="nearest",
+            help="where a further model is made",
+        ),
+        to.add_argument("--n-oct", type=int, default=1, metavar="N", help="octaves"),
+        to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
+    ]  # fmt: skip
+    to.set_defaults(parameters=[flag.dest for flag in flags], output=None)
+
+
+def _blur_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=blur)
+    to.add_argument(
+        "picture", metavar="PSF", type=Path,
+        help="PNG, TIFF, JPEG or npy whose values are proportional to light (no gamma)",
+    )  # fmt: skip
+    to.add_argument(
+        "--oversampling", type=float, default=1.0, metavar="K",
+        help="samples of the picture per pixel of the camera",
+    )  # fmt: skip
+    to.add_argument(
+        "--background", type=_background, default=0.0, metavar="B",
+        help="level to subtract first, in units of the picture (PNG: 0 to 1), or border for the "
+        "median of its outermost samples; 0 if not given",
+    )  # fmt: skip
+
+
+def _background(text: str) -> float | str:
+    if text == "border":
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no level; give a number or border") from None
+
+
+def _truth_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=truth)
+    to.add_argument("picture", metavar="PICTURE", type=Path, help="PNG, TIFF, JPEG or npy")
+    to.add_argument(
+        "-o", "--output", metavar="OUT", type=Path, default=argparse.SUPPRESS,
+        help="table to write, .csv or .parquet; standard output if not given",
+    )  # fmt: skip
+    flags = [
+        to.add_argument(
+            "--camera-blur", type=float, required=True, metavar="C", default=argparse.SUPPRESS,
+            help="Gaussian blur that the picture already has, pixels",
+        ),
+        to.add_argument("--sigma-min", type=float, default=1.1, metavar="S", help="first scale"),
+        to.add_argument("--sigma-max", type=float, default=2.2, metavar="S", help="last scale"),
+        to.add_argument(
+            "--kappa", type=float, default=2 ** (1 / 3), metavar="K",
+            help="ratio of the two blurs of the difference of Gaussians",
+        ),
+        to.add_argument(
+            "--n-spo", type=int, nargs="+", default=(5, 10, 15), metavar="N",
+            help="scales per octave of the samplings that the search starts from",
+        ),
+        to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
+    ]  # fmt: skip
+    to.set_defaults(parameters=[flag.dest for flag in flags], output=None)
+
+
+def _count(text: str) -> float:
+    with suppress(ValueError):
+        value = float(text)
+        if value.is_integer() or not math.isfinite(value):  # the library judges these
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} is no whole number; give one, or inf for no limit")
+
+
+def _seed(text: str) -> int | str:
+    try:
+        return int(text)
+    except ValueError:
+        return text

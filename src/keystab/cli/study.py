@@ -1,0 +1,88 @@
+"""Commands on the study, given in the project's folder: whence, archive, reference, verify."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from contextlib import nullcontext
+from pathlib import Path
+
+
+def whence(args: argparse.Namespace) -> None:
+    """Say where a figure comes from."""
+    from keystab.provenance.lineage import whence as of
+    from keystab.provenance.study_folder import find_project
+
+    print(of(args.figure, find_project()))
+
+
+def archive(args: argparse.Namespace) -> None:
+    """Pack a finished run into one file."""
+    from keystab.provenance.archive import pack
+    from keystab.provenance.lineage import file_digest
+    from keystab.provenance.study_folder import Study, find_project
+    from keystab.utils.memory import in_words
+
+    path = pack(Study(find_project(), args.configfile))
+    print(f"{path}: {in_words(path.stat().st_size)}, sha256 {file_digest(path)}")
+
+
+def reference(args: argparse.Namespace) -> None:
+    """Copy the small results of a finished run to where they can be committed."""
+    from keystab.provenance.archive import publish
+    from keystab.provenance.study_folder import Study, find_project
+    from keystab.utils.memory import in_words
+
+    folder = publish(Study(find_project(), args.configfile))
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
+    print(f"{folder}: {len(sizes)} files, {in_words(sum(sizes))}")
+
+
+def verify(args: argparse.Namespace) -> int:
+    """Check an archive, or the results that are here; recompute figures on request."""
+    from keystab.provenance import verification
+    from keystab.provenance.lineage import file_digest
+    from keystab.provenance.study_folder import Study, find_project
+    from keystab.provenance.unpacking import require_archive
+    from keystab.utils.validation import integer, number
+
+    integer("cores", args.cores, least=1)  # Snakemake waits for ever for the first of none
+    for name in ("rtol", "atol"):
+        number(name, getattr(args, name), least=0)
+    project = find_project()
+    start = time.monotonic()
+    if args.archive is None:
+        print(f"results of {project}")
+        checks, sound = verification.check_here(Study(project, args.configfile))
+    else:
+        require_archive(args.archive)
+        print(f"{args.archive}: sha256 {file_digest(args.archive)}")
+        checks, sound = verification.check_archive(args.archive, project)
+    print(verification.report(checks), flush=True)
+    if args.recompute and (sound or args.archive is None):
+        sound = _recompute(args, project) and sound
+    elif args.recompute:
+        print("nothing is recomputed: the archive is not what a run of the study packs")
+    verdict = "verified" if sound else "NOT verified: see the lines marked FAILED"
+    print(f"{verdict} ({time.monotonic() - start:.0f} s)")
+    return 0 if sound else 1
+
+
+def _recompute(args: argparse.Namespace, project: Path) -> bool:
+    """Compute figures again with the code that is here; whether the numbers are the same."""
+    from keystab.provenance import recomputation, verification
+    from keystab.provenance.unpacking import committed, unpacked
+
+    reference = project / "results/reference"
+    if args.archive is None:  # the committed reference is compared with, whatever else is here
+        own = verification.check_reference_itself(reference)
+        if own.problems:
+            print(verification.report([own]))
+            return False
+    with unpacked(args.archive) if args.archive else nullcontext(committed(reference)) as held:
+        print(f"recomputing {' '.join(args.recompute)} with the code of {project}", flush=True)
+        checks, same = recomputation.recompute(
+            held, project, args.recompute, args.cores, args.rtol, args.atol
+        )
+    print(f"recomputed {' '.join(args.recompute)}\n{verification.report(checks)}")
+    return same

@@ -1,0 +1,160 @@
+"""The verdicts on all claims, as a table, as JSON and for people."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from keystab.study.verdicts import UNTESTED, VERDICTS, Judgement, tally
+from keystab.utils.files import written_whole
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["FIELDS", "cell", "records", "to_json", "to_markdown", "to_table", "write_ledger"]
+
+#: What the ledger says of every claim, in this order.
+FIELDS = (
+    *("id", "where", "statement", "figure", "table", "criterion"),
+    *("value", "interval", "paper", "verdict", "note"),
+)
+
+
+def records(judgements: Iterable[Judgement]) -> list[dict[str, Any]]:
+    """One record per claim with `FIELDS`; numbers that do not exist are None, infinity is "inf".
+
+    ``value`` maps names to numbers, ``interval`` names to pairs of ends, where there are any.
+    """
+    return [
+        {
+            "id": each.claim.id,
+            "where": each.claim.where,
+            "statement": each.claim.statement,
+            "figure": each.claim.figure,
+            "table": [f"{name}.csv" for name in each.claim.tables],
+            "criterion": each.claim.criterion,
+            "value": {name: _plain(part.value) for name, part in each.measured.items()},
+            "interval": {
+                name: [_plain(part.low), _plain(part.high)]
+                for name, part in each.measured.items()
+                if not math.isnan(part.low)
+            },
+            "paper": each.claim.paper,
+            "verdict": each.verdict,
+            "note": each.note,
+        }
+        for each in judgements
+    ]
+
+
+def _plain(value: float) -> float | str | None:
+    """Number as JSON can say it."""
+    if math.isnan(value):
+        return None
+    return value if math.isfinite(value) else str(value)
+
+
+def to_json(judgements: Iterable[Judgement]) -> str:
+    """Write the ledger as JSON: a list of objects, see `records`."""
+    return json.dumps(records(judgements), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def to_table(judgements: Iterable[Judgement]) -> pd.DataFrame:
+    """Lay out the ledger as a table of texts, one row per claim."""
+    import pandas as pd
+
+    rows = [
+        record
+        | {
+            "table": " ".join(record["table"]),
+            "value": _numbers(record["value"]),
+            "interval": "; ".join(
+                f"{name} {_short(low)} to {_short(high)}"
+                for name, (low, high) in record["interval"].items()
+            ),
+        }
+        for record in records(judgements)
+    ]
+    return pd.DataFrame(rows, columns=list(FIELDS))
+
+
+def _numbers(values: Mapping[str, float | str | None]) -> str:
+    return "; ".join(f"{name} {_short(value)}" for name, value in values.items())
+
+
+def _short(value: float | str | None) -> str:
+    """Write a number for people: four digits, or all of a whole number.
+
+    Examples
+    --------
+    >>> _short(0.123456), _short(12345.0), _short(None)
+    ('0.1235', '12345', 'missing')
+    """
+    if value is None:
+        return "missing"
+    if isinstance(value, str):
+        return value
+    return f"{value:.0f}" if value == round(value) else f"{value:.4g}"
+
+
+def to_markdown(judgements: Sequence[Judgement]) -> str:
+    """Write the ledger for people: how many verdicts of each kind, then the claims by verdict."""
+    table = to_table(judgements)
+    counts = tally(judgements)
+    lines = [
+        "# What the paper says, and what this run says of it",
+        "",
+        "Every claim was given a criterion from the paper's words. `claims.csv` and `claims.json`",
+        "hold the same with all criteria; `config/claims.yaml` says how each number is computed.",
+        "",
+        "| verdict | claims |",
+        "|---|---|",
+        *(f"| {verdict} | {number} |" for verdict, number in counts.items()),
+        f"| all | {len(judgements)} |",
+    ]
+    for verdict in VERDICTS:
+        if not counts[verdict]:
+            continue
+        lines += ["", f"## {verdict.capitalize()}", ""]
+        if verdict == UNTESTED:
+            lines += ["| claim | where | the paper says | why |", "|---|---|---|---|"]
+        else:
+            lines += [
+                "| claim | where | the paper says | its number or word | criterion | found | |",
+                "|---|---|---|---|---|---|---|",
+            ]
+        for row in table[table["verdict"] == verdict].to_dict("records"):
+            cells = [f"`{row['id']}`", _place(row), row["statement"]]
+            if verdict != UNTESTED:
+                found = row["value"] + (f" ({row['interval']})" if row["interval"] else "")
+                cells += [row["paper"], f"`{row['criterion']}`", found]
+            lines.append("| " + " | ".join(cell(text) for text in (*cells, row["note"])) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _place(row: Mapping[Any, Any]) -> str:
+    """Say where a claim stands, and in which figure it is tested."""
+    return f"{row['where']}; {row['figure']}" if row["figure"] else str(row["where"])
+
+
+def cell(text: str) -> str:
+    """Text that does not end a cell of a Markdown table."""
+    return text.replace("|", "\\|")
+
+
+def write_ledger(
+    judgements: Sequence[Judgement],
+    csv: str | os.PathLike[str],
+    json_file: str | os.PathLike[str],
+    markdown: str | os.PathLike[str],
+) -> None:
+    """Write the ledger as a table, as JSON and for people; each file whole or not at all."""
+    from keystab.io.tables import write_table
+
+    write_table(to_table(judgements), csv)
+    for path, text in ((json_file, to_json(judgements)), (markdown, to_markdown(judgements))):
+        with written_whole(path) as part:
+            part.write_text(text, encoding="utf-8", newline="")
