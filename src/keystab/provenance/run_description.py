@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from keystab import __version__
+from keystab._version import __version__
 from keystab.errors import InputError
 
 __all__ = [
