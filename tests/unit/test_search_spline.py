@@ -21,11 +21,8 @@ from keystab.scalespace.dog import scale_space
 def both(image, n_spo, epsilon=0.0, camera_blur=1.1, **options):
     """Extrema of the two searches."""
     space = scale_space(image, camera_blur, n_spo, **options)
-    assert applies(space) or search_cosine.applies(space)
-    with (
-        patch.object(search_spline, "applies", return_value=False),
-        patch.object(search_cosine, "applies", return_value=False),
-    ):
+    assert extrema.search_of_few(space)
+    with patch.object(extrema, "search_of_few", return_value=None):
         dense = extrema.discrete_extrema(space, epsilon)
     return extrema.discrete_extrema(space, epsilon), dense
 

@@ -21,7 +21,6 @@ import numpy as np
 import threadpoolctl
 from numba import njit
 
-from keystab.detection import search_cosine, search_spline
 from keystab.detection.search_cosine import BandLimitedSearch
 from keystab.detection.search_spline import InterpolatedSearch
 from keystab.errors import InputError
@@ -42,6 +41,9 @@ BAND_ROWS = 8192
 # Samples that one search may meet: 40 minutes of one core for the spline at n_spo = 15, and hours
 # where all samples are evaluated.
 MOST_SAMPLES = 10**12
+
+SearchOfFew = type[InterpolatedSearch] | type[BandLimitedSearch]
+_SEARCHES: dict[str, SearchOfFew] = {"spline": InterpolatedSearch, "cosine": BandLimitedSearch}
 
 Decided = tuple[np.ndarray, np.ndarray]
 """Extrema, shape (n, 4), and their cubes of samples, shape (n, 3, 3, 3)."""
@@ -164,6 +166,12 @@ def within(extrema: np.ndarray, window: tuple[slice, slice] | None) -> np.ndarra
     return inside
 
 
+def search_of_few(space: ScaleSpace) -> SearchOfFew | None:
+    """Search that needs few samples of a scale-space; None where all of them are evaluated."""
+    search = _SEARCHES[space.oversampling]
+    return search if search.applies(space) else None
+
+
 def _searches(
     space: ScaleSpace,
     tolerance: float,
@@ -174,15 +182,12 @@ def _searches(
     """What finds the candidates of a column of blocks, and the columns, band by band."""
     columns = list(ranges(window[1].start, window[1].stop, BLOCK_COLUMNS))
     bands = list(ranges(window[0].start, window[0].stop, BAND_ROWS))
+    search = search_of_few(space)
     for top, bottom in bands:
-        few: InterpolatedSearch | BandLimitedSearch
-        if search_spline.applies(space):
-            few = InterpolatedSearch(
+        if search is not None:
+            few = search(
                 space, tolerance, slice(top, bottom), window[1], threads, keep=len(bands) == 1
             )
-            yield partial(_interpolated, few), range(few.n_columns)
-        elif search_cosine.applies(space):
-            few = BandLimitedSearch(space, tolerance, slice(top, bottom), window[1])
             yield partial(_interpolated, few), range(few.n_columns)
         else:
             rows = list(ranges(top, bottom, BLOCK_ROWS))
@@ -264,17 +269,14 @@ def bytes_of_search(space: ScaleSpace, threads: int = 1) -> float:
     sampling = space.sampling
     height, width = sampling.shape
     n_blurs = space.blurs[0].size
-    reached = float(height)
-    if space.oversampling == "spline":  # source rows within some standard deviations of a row
-        reached = min(reached, 17 * sampling.kappa * float(sampling.sigma[-1]) + 12)
+    reached = space.interpolant.rows_in_reach(sampling.kappa * float(sampling.sigma[-1]), height)
     band = 2.0 * n_blurs * min(BAND_ROWS, sampling.grid_shape[0]) * reached
     strips = 2.0 * n_blurs * BLOCK_COLUMNS * height * threads
     axes = 8 * sum(sampling.base_grid_shape)
     blocks = 4 * n_blurs * BLOCK_ROWS * BLOCK_COLUMNS * threads
-    if search_spline.applies(space):
-        band, strips = band / 3, strips / 3
-    elif search_cosine.applies(space):
-        band, strips = band / (2 * n_blurs), strips / 3  # all blurs share the rows
+    if search := search_of_few(space):
+        of_band, of_strips = search.shares_of_memory(n_blurs)
+        band, strips = band * of_band, strips * of_strips
     return 8.0 * (6 * height * width + axes + blocks + band + strips)
 
 

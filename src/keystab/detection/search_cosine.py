@@ -47,9 +47,7 @@ _FAINT = 1e-9
 
 
 def applies(space: ScaleSpace) -> bool:
-    """Whether a scale-space is sampled finely enough to gain by it, and larger than one block."""
-    if space.oversampling != "cosine":
-        return False
+    """Whether the scale-space of a cosine series is sampled finely enough, and is not too small."""
     if space.shape[1] < _ROWS or space.shape[2] < _COLUMNS:
         return False
     if space.largest > LARGEST:
@@ -99,7 +97,26 @@ class BandLimitedSearch:
 
     length, abreast = _ROWS, _COLUMNS
 
-    def __init__(self, space: ScaleSpace, tolerance: float, rows: slice, columns: slice) -> None:
+    @staticmethod
+    def applies(space: ScaleSpace) -> bool:
+        """See `applies`."""
+        return applies(space)
+
+    @staticmethod
+    def shares_of_memory(n_blurs: int) -> tuple[float, float]:
+        """What its rows and its strips take of those for all samples; all blurs share the rows."""
+        return 1 / (2 * n_blurs), 1 / 3
+
+    def __init__(
+        self,
+        space: ScaleSpace,
+        tolerance: float,
+        rows: slice,
+        columns: slice,
+        threads: int = 1,
+        keep: bool = True,
+    ) -> None:
+        # Rows are made at once, and are the same for all blurs: there is nothing to share or keep.
         self.space, self.tolerance = space, tolerance
         self.y_starts = np.array(starts_of(rows, space.shape[1], self.length), dtype=np.int64)
         self.x_starts = starts_of(columns, space.shape[2], self.abreast)

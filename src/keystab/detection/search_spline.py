@@ -61,9 +61,9 @@ _KINKED = 0.6
 
 
 def applies(space: ScaleSpace) -> bool:
-    """Whether a scale-space is sampled finely enough, and its rows are local."""
+    """Whether the scale-space of a spline is sampled finely enough, and its rows are local."""
     length = block_length(space)
-    if space.oversampling != "spline" or length < _LEAST:
+    if length < _LEAST:
         return False
     if min(space.shape[1], space.shape[2]) < _ABREAST * length:
         return False
@@ -143,6 +143,16 @@ class InterpolatedSearch:
         Whether operators, some tens of MB, are kept for further images of this size: those of the y
         axis, and those of up to 64 columns of blocks.
     """
+
+    @staticmethod
+    def applies(space: ScaleSpace) -> bool:
+        """See `applies`."""
+        return applies(space)
+
+    @staticmethod
+    def shares_of_memory(n_blurs: int) -> tuple[float, float]:
+        """What its rows and its strips take of those for all samples."""
+        return 1 / 3, 1 / 3
 
     def __init__(
         self,

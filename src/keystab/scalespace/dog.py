@@ -18,10 +18,8 @@ from numba import njit
 
 from keystab.errors import InputError
 from keystab.scalespace.axis import AxisOperator, Block
-from keystab.scalespace.cosine_axis import CosineAxis, cosine_source
-from keystab.scalespace.neighbourhoods import cosine_neighbourhoods, spline_neighbourhoods
-from keystab.scalespace.sampling import OVERSAMPLINGS, Sampling, balanced_delta
-from keystab.scalespace.spline_axis import SplineAxis, spline_source
+from keystab.scalespace.interpolants import Interpolant, interpolant
+from keystab.scalespace.sampling import Sampling, balanced_delta
 from keystab.utils import memory
 
 # A tile of the store; searching for extrema uses flatter blocks (see `keystab.detection.extrema`).
@@ -73,12 +71,15 @@ class ScaleSpace:
         """Tiles in y and in x."""
         return (-(-self.shape[1] // TILE), -(-self.shape[2] // TILE))
 
+    @property
+    def interpolant(self) -> Interpolant:
+        """Interpolant of the input image."""
+        return interpolant(self.oversampling)
+
     @cached_property
     def source(self) -> np.ndarray:
         """What the axis operators act on: spline coefficients or cosine coefficients."""
-        if self.oversampling == "spline":
-            return np.ascontiguousarray(spline_source(self.image))
-        return np.ascontiguousarray(cosine_source(self.image))
+        return self.interpolant.source(self.image)
 
     @cached_property
     def blurs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -227,8 +228,7 @@ class ScaleSpace:
         """
         indices = [np.ascontiguousarray(i, dtype=np.int64) for i in (s, row, column)]
         _, lower, upper = self.blurs
-        evaluate = spline_neighbourhoods if self.oversampling == "spline" else cosine_neighbourhoods
-        return evaluate(self.source, self.axes, lower, upper, *indices)
+        return self.interpolant.neighbourhoods(self.source, self.axes, lower, upper, *indices)
 
     @cached_property
     def largest(self) -> float:
@@ -243,11 +243,7 @@ class ScaleSpace:
         of the largest source value. Differences of samples below this carry no information: in
         flat areas they would be extrema of nothing.
         """
-        if self.oversampling == "spline":
-            amplitude = float(np.abs(self.source).max())
-        else:
-            amplitude = float(np.abs(self.image - self.image.mean()).max())
-        return 2.0**-46 * amplitude
+        return 2.0**-46 * self.interpolant.amplitude(self.image, self.source)
 
     def attributes(self) -> dict[str, object]:
         """Everything needed to build this scale-space again from its image."""
@@ -318,11 +314,7 @@ def scale_space(
     >>> space.tile(0, 0).shape
     (5, 23, 23)
     """
-    if oversampling not in OVERSAMPLINGS:
-        raise InputError(
-            f"oversampling is {oversampling!r}, allowed are {' and '.join(OVERSAMPLINGS)}: "
-            "change oversampling"
-        )
+    interpolant(oversampling)
     array = checked_image(image)
     if delta_min is None:
         delta_min = balanced_delta(n_spo, kappa, sigma_min)
@@ -349,8 +341,7 @@ def _axis(
     blurs: tuple[float, ...],
 ) -> AxisOperator:
     """Operator of one axis, shared by all images of one size that are sampled alike."""
-    kind = SplineAxis if oversampling == "spline" else CosineAxis
-    return kind(n_samples, n_pixels, delta_min, stride, np.array(blurs))
+    return interpolant(oversampling).axis(n_samples, n_pixels, delta_min, stride, np.array(blurs))
 
 
 def checked_image(image: np.ndarray) -> np.ndarray:

@@ -13,8 +13,6 @@ import numpy as np
 from keystab.errors import InputError
 from keystab.utils import validation
 
-OVERSAMPLINGS = ("spline", "cosine")
-
 # Beyond this many samples in one axis an index times delta_min loses digits that matter, and no
 # machine that we know of finishes the octave.
 _MOST_SAMPLES_PER_AXIS = 2**22
