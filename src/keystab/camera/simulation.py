@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from keystab.camera.views import ViewSpec, effective_blur, to_reference, to_view
 from keystab.errors import InputError
 from keystab.scalespace import cosine_series
-from keystab.utils import memory
+from keystab.utils import memory, validation
 
 __all__ = [
     "Scene",
@@ -222,6 +222,7 @@ def _grey_values(reference: ArrayLike) -> NDArray[Any]:
         raise InputError(
             f"the reference is {reference!r}; give the array that read_picture returns"
         )
+    validation.unmasked("the reference", reference)
     try:
         values = np.asarray(reference)
     except ValueError:  # rows of different lengths

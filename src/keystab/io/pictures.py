@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from keystab.errors import InputError
 from keystab.utils.files import check_writable, written_whole
+from keystab.utils.validation import unmasked
 
 __all__ = [
     "FORMATS",
@@ -174,7 +175,7 @@ def write_picture(u: NDArray[np.floating[Any]], path: str | os.PathLike[str]) ->
     path = Path(path)
     check_writable(path, FORMATS)
     suffix = path.suffix.lower()
-    u = np.asarray(u)
+    u = np.asarray(unmasked(f"{path}: the picture", u))
     if u.dtype.kind not in "biuf":
         raise InputError(f"{path}: values of type {u.dtype} are no grey values; give real numbers")
     if u.ndim != 2 or u.size == 0:
