@@ -25,6 +25,8 @@ from keystab.io.tables import read_table
 from keystab.truth.true_extrema import true_extrema
 from keystab.utils import memory
 
+BLUR = "--camera-blur 0.8"
+
 
 @pytest.fixture
 def picture(tmp_path):
@@ -111,6 +113,21 @@ def test_truth_passes_every_parameter(picture, tmp_path, capsys):
     pd.testing.assert_frame_equal(printed, expected)
 
 
+@pytest.mark.parametrize(
+    "command",
+    [f"detect PICTURE {BLUR} -o LINK", f"truth PICTURE {BLUR} -o LINK", "simulate PICTURE LINK"],
+)
+def test_output_on_a_link_goes_where_the_link_leads(picture, tmp_path, command):
+    is_view = command.startswith("simulate")
+    target = tmp_path / "far" / ("view.npy" if is_view else "table.csv")
+    link = tmp_path / f"link{target.suffix}"
+    link.symlink_to(target)
+    command += " --blur 1 --step 2" if is_view else ""
+    words = command.replace("PICTURE", str(picture)).replace("LINK", str(link))
+    assert cli.main(words.split()) == 0
+    assert link.is_symlink() and target.stat().st_size > 0
+
+
 @pytest.mark.parametrize("suffix", [".npy", ".tiff", ".png"])
 def test_simulate_takes_the_view(picture, tmp_path, suffix, capsys):
     out = tmp_path / f"view{suffix}"
@@ -141,9 +158,6 @@ def test_seeds_may_be_words(picture, tmp_path):
     assert not np.array_equal(
         read_picture(tmp_path / "7.npy"), read_picture(tmp_path / "seven.npy")
     )
-
-
-BLUR = "--camera-blur 0.8"
 
 
 @pytest.mark.parametrize(

@@ -3,17 +3,24 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import blob, blobs
 
+from keystab.camera.psf_fit import border_level, fit_psf
+from keystab.camera.simulation import simulate_view
+from keystab.camera.views import ViewSpec
 from keystab.detection.detector import detect_keypoints
 from keystab.detection.extrema import discrete_extrema
 from keystab.errors import InputError
+from keystab.io.pictures import write_picture
 from keystab.scalespace.dog import scale_space
 from keystab.scalespace.sampling import balanced_delta
 from keystab.scalespace.spline_axis import SplineAxis, cosine_domain_kernel
+from keystab.truth.scene_extrema import scene_extrema
+from keystab.truth.true_extrema import true_extrema
 
 KAPPA = 2 ** (1 / 3)
 
@@ -330,3 +337,48 @@ def test_wrong_input_gets_one_line(change, words):
         detect_keypoints(**arguments)
     assert words in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
+@pytest.mark.parametrize("max_offset", [0.3, 0.6, 1.5])
+def test_positions_stay_in_the_documented_range(oversampling, max_offset):
+    image = np.random.default_rng(5).random((120, 140))
+    options = {"max_offset": max_offset, "oversampling": oversampling}
+    found = detect_keypoints(image, 0.5, 7, 0.2, 0.8, n_oct=2, **options)
+    assert len(found) > 5
+    step = 0.2 * 2.0 ** found["octave"]
+    for name, size in zip(("y", "x"), image.shape, strict=True):
+        assert (found[name] > (1 - max_offset) * step).all()
+        assert (found[name] < size - 0.2 - (1 - max_offset) * step).all()
+
+
+def test_keypoints_are_found_beyond_the_last_pixel():
+    # Its mirror image makes a blob on the border whole: the centre lies half a pixel beyond.
+    image = blob((30, 34), (29.5, 33.5), math.hypot(2.0, 0.9))
+    found = detect_keypoints(image, 0.9, 15, oversampling="cosine")
+    at = found.loc[found["value"].idxmin()]
+    assert [at["y"], at["x"]] == pytest.approx([29.5, 33.5], abs=0.01)
+    noise = np.random.default_rng(6).random((40, 400))
+    assert detect_keypoints(noise, 0.8, 9, 0.1)["y"].max() == pytest.approx(39.594, abs=0.001)
+
+
+@pytest.mark.parametrize("mask", [[[0, 1], [0, 0]], [[1, 1], [1, 1]]])
+def test_what_is_masked_is_not_taken_for_seen(mask, tmp_path):
+    masked = np.ma.array(np.tile(np.float64([[0.2, 0.4], [0.3, 0.5]]), (9, 9)))
+    plain = detect_keypoints(masked, 0.5)  # nothing is masked yet
+    pd.testing.assert_frame_equal(plain, detect_keypoints(masked.data, 0.5))
+    masked.mask = np.tile(mask, (9, 9))
+    spec = ViewSpec(1.0, 2.0, (3, 3))
+    for use in (
+        lambda: detect_keypoints(masked, 0.5),
+        lambda: scale_space(masked, 0.5),
+        lambda: true_extrema(masked, 0.5),
+        lambda: scene_extrema(masked, spec),
+        lambda: simulate_view(masked, 1.0, 2.0, (3, 3)),
+        lambda: fit_psf(masked),
+        lambda: border_level(masked),
+        lambda: write_picture(masked, tmp_path / "u.npy"),
+    ):
+        with pytest.raises(InputError, match=rf"{np.sum(masked.mask)} masked values"):
+            use()
+    assert list(tmp_path.iterdir()) == []

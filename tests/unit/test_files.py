@@ -153,3 +153,57 @@ def test_what_a_killed_process_left_is_removed_by_the_next_that_writes(tmp_path)
     with written_whole(target) as part:
         part.write_text("whole")
     assert {path.name for path in tmp_path.iterdir()} == {"result.txt", *kept}
+
+
+@pytest.mark.parametrize("exists", [True, False])
+def test_a_file_is_written_through_a_link(tmp_path, exists):
+    kept, links = tmp_path / "kept", tmp_path / "links"
+    kept.mkdir(), links.mkdir()
+    (links / "once.csv").symlink_to("../kept/data")  # relative, and of another suffix
+    (links / "twice.csv").symlink_to(links / "once.csv")
+    if exists:
+        (kept / "data").write_text("old")
+    check_writable(links / "twice.csv", (".csv",))
+    with written_whole(links / "twice.csv") as part:
+        assert part.suffix == ".csv"  # what the writer goes by
+        part.write_text("new")
+        assert (kept / "data").exists() == exists
+    assert (kept / "data").read_text() == "new"
+    assert all((links / name).is_symlink() for name in ("once.csv", "twice.csv"))
+    assert [path.name for path in kept.iterdir()] == ["data"]
+
+
+def test_a_folder_is_written_through_a_link(tmp_path):
+    for name in ("one", "two"):
+        (tmp_path / "store").mkdir(exist_ok=True)
+        (tmp_path / "link").unlink(missing_ok=True)
+        (tmp_path / "link").symlink_to("store")
+        with written_whole(tmp_path / "link") as part:
+            part.mkdir()
+            (part / name).touch()
+        assert [path.name for path in (tmp_path / "store").iterdir()] == [name]
+    assert {path.name for path in tmp_path.iterdir()} == {"link", "store"}
+
+
+def test_links_in_a_circle_and_devices_are_refused(tmp_path):
+    (tmp_path / "a.csv").symlink_to("b.csv")
+    (tmp_path / "b.csv").symlink_to("a.csv")
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "null.csv").symlink_to(os.devnull)
+    for name, words in (("a", "in a circle"), ("pipe", "neither a file"), ("null", "neither a")):
+        path = tmp_path / f"{name}.csv"
+        with pytest.raises(InputError, match=f"{name}.csv is .*{words}"):
+            check_writable(path)
+        with pytest.raises(InputError, match=words), written_whole(path):
+            pass
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_what_a_killed_process_left_beside_the_file_of_a_link_is_removed(tmp_path):
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    (tmp_path / f".part-{dead.pid}-data.csv").touch()
+    (tmp_path / "link.csv").symlink_to("data")
+    with written_whole(tmp_path / "link.csv") as part:
+        part.touch()
+    assert {path.name for path in tmp_path.iterdir()} == {"link.csv", "data"}

@@ -1,7 +1,12 @@
 """Reading pictures: values, depths, colours, and what is refused."""
 
 import hashlib
+import logging
+import struct
+import tracemalloc
+import zlib
 
+import cv2
 import imageio.v3 as iio
 import numpy as np
 import pytest
@@ -10,6 +15,7 @@ from PIL import Image
 
 from keystab.errors import InputError
 from keystab.io.pictures import picture_shape, pixel_digest, read_picture, write_picture
+from keystab.utils import memory
 
 LEVELS = np.array([[0, 51, 102], [153, 204, 255]], dtype=np.uint8)
 COLOUR = np.random.default_rng(0).integers(0, 256, (5, 4, 3), dtype=np.uint8)
@@ -265,3 +271,107 @@ def test_a_picture_never_replaces_a_folder(tmp_path):
     with pytest.raises(InputError, match=r"u\.npy is a folder; give a file name"):
         write_picture(LEVELS / 255, path)
     assert (path / "precious").read_text() == "kept"
+
+
+def png_of(height, width):
+    """Grey PNG that promises many pixels and holds next to nothing."""
+    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(bytes(9))), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        for name, data in chunks
+    )
+
+
+def tiff_of(height, width):
+    """TIFF that promises many pixels in one small strip."""
+    tags = {256: width, 257: height, 258: 8, 259: 8, 262: 1, 273: 8, 277: 1, 278: height, 279: 9}
+    body = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags.items())
+    return struct.pack("<2sHI", b"II", 42, 8) + struct.pack("<H", len(tags)) + body + bytes(13)
+
+
+def test_large_pictures_are_judged_by_what_they_need(tmp_path, monkeypatch):
+    small = np.zeros((40, 50), np.uint8)
+    files = {"jpeg.jpg": iio.imwrite, "png.png": iio.imwrite, "tiff.tif": tifffile.imwrite}
+    files |= {"npy.npy": np.save, "webp.webp": iio.imwrite, "gif.gif": iio.imwrite}
+    files["pgm.pgm"] = lambda path, v: path.write_bytes(b"P5 50 40 255 " + v.tobytes())
+    files["lzw.tif"] = lambda path, v: Image.fromarray(v).save(path, compression="tiff_lzw")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)  # more than ten times over it
+    for name, write in files.items():
+        write(tmp_path / name, small)
+        assert read_picture(tmp_path / name).shape == (40, 50), name
+        assert Image.MAX_IMAGE_PIXELS == 100
+    monkeypatch.setattr(memory, "available", lambda: 30_000)
+    for name in files:
+        assert picture_shape(tmp_path / name) == (40, 50), name
+        with pytest.raises(InputError, match="40 x 50 pixels needs about .* of memory") as raised:
+            read_picture(tmp_path / name)
+        assert name in str(raised.value) and "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("bomb.png", png_of),
+        ("bomb.tif", tiff_of),
+        ("bomb.pgm", lambda h, w: b"P5 %d %d 255 " % (w, h)),
+    ],
+)
+def test_bombs_are_refused_by_their_size_and_measured_without_it(tmp_path, name, data, monkeypatch):
+    path = tmp_path / name
+    path.write_bytes(data(14_000, 14_001))
+    assert picture_shape(path) == (14_000, 14_001)  # nothing is decoded
+    monkeypatch.setattr(memory, "available", lambda: 3 * 10**9)
+    with pytest.raises(InputError, match=r"14000 x 14001 pixels needs about 3\.53 GB of memory"):
+        read_picture(path)
+
+
+@pytest.mark.parametrize("kind", ["colours.tif", "floats.tif", "odd.ppm", "grey.npy"])
+def test_the_estimate_of_memory_bounds_what_is_taken(tmp_path, monkeypatch, kind):
+    path = tmp_path / kind
+    values = np.random.default_rng(0).integers(0, 65535, (700, 900, 3), np.uint16)
+    if kind == "floats.tif":
+        cv2.imwrite(str(path), values.astype(np.float32))
+    elif kind == "grey.npy":
+        np.save(path, values[..., 0])
+    else:
+        cv2.imwrite(str(path), values)
+    read_picture(path)  # what is imported does not count
+    estimates = []
+    monkeypatch.setattr(memory, "require", lambda n_bytes, *_: estimates.append(n_bytes))
+    tracemalloc.start()
+    try:
+        read_picture(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert 0.3 < peak / estimates[0] < 1
+
+
+def test_an_orientation_changes_shape_and_digest_as_turning_does(tmp_path):
+    exif = Image.Exif()
+    exif[274] = 6
+    picture = Image.fromarray(COLOUR)
+    picture.save(tmp_path / "turned.png", exif=exif)
+    picture.save(tmp_path / "turned.tif", exif=exif, compression="tiff_lzw")
+    Image.fromarray(np.rot90(COLOUR, -1)).save(tmp_path / "upright.png")
+    for name in ("turned.png", "turned.tif"):
+        assert picture_shape(tmp_path / name) == (4, 5)
+        assert pixel_digest(tmp_path / name) == pixel_digest(tmp_path / "upright.png")
+
+
+def test_damaged_metadata_do_not_make_a_picture_unreadable(tmp_path):
+    Image.fromarray(COLOUR).save(tmp_path / "u.png", exif=b"Exif\0\0II*\0\xff\xff\xff\xff")
+    np.testing.assert_allclose(read_picture(tmp_path / "u.png"), COLOUR_GREY, rtol=0, atol=1e-15)
+
+
+def test_what_tifffile_has_to_say_of_a_file_is_kept_to_one_line(tmp_path, caplog):
+    path = tmp_path / "u.tif"
+    tifffile.imwrite(path, LEVELS, compression="zlib", photometric="minisblack")
+    with tifffile.TiffFile(path, mode="r+") as tiff:
+        tiff.pages[0].tags["StripByteCounts"].overwrite((10, 10))
+    caplog.clear()
+    with pytest.raises(InputError, match="not a readable picture|lacks a part"):
+        read_picture(path)
+    assert [record for record in caplog.records if record.name == "tifffile"] == []
+    assert not logging.getLogger("tifffile").disabled

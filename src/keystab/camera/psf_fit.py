@@ -160,7 +160,7 @@ def border_level(psf: ArrayLike) -> float:
 
 
 def _picture(psf: ArrayLike) -> NDArray[np.float64]:
-    light = np.asarray(psf, dtype=np.float64)
+    light = np.asarray(validation.unmasked("the picture", psf), dtype=np.float64)
     if light.ndim != 2 or min(light.shape) < 3:
         raise InputError(
             f"the picture has the shape {light.shape}; give one of at least 3 x 3 samples"

@@ -13,6 +13,7 @@ from keystab.cli.library import blur, detect, inspect, simulate, truth
 from keystab.cli.study import archive, reference, verify, whence
 
 BAD_INPUT = 2
+_PICTURE = "PNG, TIFF, JPEG, PNM or npy; turned upright as its EXIF orientation asks"
 
 
 class _Parser(argparse.ArgumentParser):
@@ -136,7 +137,7 @@ def _configfile_argument(to: argparse.ArgumentParser) -> None:
 
 def _simulate_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=simulate)
-    to.add_argument("picture", metavar="PICTURE", type=Path, help="the scene: PNG, TIFF, JPEG, npy")
+    to.add_argument("picture", metavar="PICTURE", type=Path, help=f"the scene: {_PICTURE}")
     to.add_argument(
         "out", metavar="OUT", type=Path,
         help="view to write: .png (16 bits, clipped), .tiff (float32) or .npy (float64)",
@@ -172,7 +173,7 @@ def _simulate_arguments(to: argparse.ArgumentParser) -> None:
 
 def _detect_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=detect)
-    to.add_argument("picture", metavar="PICTURE", type=Path, help="PNG, TIFF, JPEG or npy")
+    to.add_argument("picture", metavar="PICTURE", type=Path, help=_PICTURE)
     to.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=argparse.SUPPRESS,
         help="table to write, .csv or .parquet; standard output if not given",
@@ -230,7 +231,7 @@ def _blur_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=blur)
     to.add_argument(
         "picture", metavar="PSF", type=Path,
-        help="PNG, TIFF, JPEG or npy whose values are proportional to light (no gamma)",
+        help=f"{_PICTURE}; its values are proportional to light (no gamma)",
     )  # fmt: skip
     to.add_argument(
         "--oversampling", type=float, default=1.0, metavar="K",
@@ -254,7 +255,7 @@ def _background(text: str) -> float | str:
 
 def _truth_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=truth)
-    to.add_argument("picture", metavar="PICTURE", type=Path, help="PNG, TIFF, JPEG or npy")
+    to.add_argument("picture", metavar="PICTURE", type=Path, help=_PICTURE)
     to.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=argparse.SUPPRESS,
         help="table to write, .csv or .parquet; standard output if not given",

@@ -91,11 +91,20 @@ def detect_keypoints(
     Raises
     ------
     InputError
-        For an image that is not a finite two-dimensional array, a parameter out of its range, or a
-        search that takes more memory than there is or meets more than 1e12 samples.
+        For an image that is not a finite two-dimensional array or of which a part is masked, a
+        parameter out of its range, or a search that takes more memory than there is or meets more
+        than 1e12 samples.
 
     Notes
     -----
+    The grid has samples at 0, step, 2 step, ... below the height, as in the paper, so that it
+    begins at the centre of the first row of pixels and ends beyond that of the last, at
+    ``height - 1``. With `refine`,
+    ``(1 - max_offset) step < y < height - delta_min - (1 - max_offset) step``, where the step of an
+    octave is ``delta_min * 2**octave``; likewise ``x``. What lies beyond ``height - 0.5`` is found
+    in the mirror image by which the picture is continued. Where that matters keep the rows with
+    ``y <= height - 1`` and ``x <= width - 1``.
+
     Slices s = 1 .. n_spo of each octave are reported, so that octaves meet without overlap. Where
     they meet, an extremum may be seen from both sides or from none, because the two grids differ.
     Therefore, with more than one octave, both are searched one slice beyond the seam; detections of

@@ -15,7 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keystab.errors import InputError
+from keystab.io import netpbm_pictures, pillow_pictures, tiff_pictures
+from keystab.io.picture_samples import Samples, check_channels, check_room
 from keystab.utils.files import check_writable, written_whole
+from keystab.utils.validation import unmasked
 
 __all__ = [
     "FORMATS",
@@ -33,27 +36,25 @@ FORMATS = (".png", ".tif", ".tiff", ".npy")
 LUMA = (0.299, 0.587, 0.114)
 
 _READABLE = "PNG, JPEG, TIFF or .npy"
-_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
-_PNG_COLOUR_TYPES = (b"\2", b"\4", b"\6")  # RGB, grey with alpha, RGB with alpha
 _NPY_SIGNATURE = b"\x93NUMPY"
-_TIFF_SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 
 def read_picture(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     """Read a picture as grey values.
 
-    Unsigned integers of any depth are divided by their largest value, so that black is 0 and
-    white is 1. Floating-point pictures are kept as they are, whatever their range. Colour becomes
-    0.299 R + 0.587 G + 0.114 B of the stored values; no gamma is undone. Transparency (an alpha
-    channel) is ignored: the stored colour counts. EXIF orientation is ignored too.
+    Unsigned integers of any depth are divided by the largest value of that depth, so that black is
+    0 and white is 1, also where the file stores white as 0. Floating-point pictures are kept as
+    they are, whatever their range. Colour becomes 0.299 R + 0.587 G + 0.114 B of the stored values;
+    no gamma is undone. Transparency (an alpha channel) is ignored: the stored colour counts. The
+    picture is turned upright as its EXIF or TIFF orientation asks, whatever the format.
 
     Parameters
     ----------
     path : path
-        A PNG, JPEG, TIFF or NumPy (.npy) file; other formats that Pillow knows are tried. The
+        A PNG, JPEG, TIFF, PNM (PBM, PGM, PPM, PAM, PFM), GIF, WebP, BMP or NumPy (.npy) file. The
         content decides, whatever the suffix. Arrays in .npy files have the shape (height, width)
-        or (height, width, channels). Previews beside the picture (JPEG with MPO, reduced pages of
-        a TIFF) do not count.
+        or (height, width, channels). Previews, masks and depth maps beside the picture (reduced
+        and mask pages of a TIFF, JPEG with MPO) do not count.
 
     Returns
     -------
@@ -64,9 +65,17 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     ------
     InputError
         If the file is missing or unreadable, holds several pictures (pages or frames of an
-        animation), holds signed integers, NaN or infinities, is a floating-point TIFF in which 0
-        is white, or is a PNG in colour with 16 bits per channel, which the decoder at hand would
-        cut down to 8 bits.
+        animation), needs more memory than there is, or holds signed integers, NaN or infinities.
+        Also where depth, sign or scale could get lost with the decoders at hand: a PNG in colour or
+        with alpha of 16 bits per channel; a TIFF of floats in which 0 is white, in inks of more
+        than 8 bits, in Lab, of raw sensor data, or compressed by other than LZW, deflate,
+        PackBits, LZMA, Zstandard, fax or 8-bit JPEG; a BMP of 16 bits per pixel; a PFM with a scale
+        other than 1; and every format that is not named above, such as JPEG 2000 and AVIF.
+
+    Notes
+    -----
+    Only these are not exact: JPEG as such; inks of 8 bits (CMYK), which become colours by the plain
+    formula, rounded to 8 bits.
 
     Examples
     --------
@@ -84,8 +93,8 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.float64]:
 def read_with_digest(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], str]:
     """Read a picture as `read_picture` does, and its `pixel_digest`, from one decoding."""
     path = Path(path)
-    pixels = _decode(path)
-    return _finite_grey(pixels, path), _digest(pixels)
+    samples = _decode(path)
+    return _finite_grey(samples, path), _digest(samples)
 
 
 def picture_shape(path: str | os.PathLike[str]) -> tuple[int, int]:
@@ -99,7 +108,8 @@ def picture_shape(path: str | os.PathLike[str]) -> tuple[int, int]:
     Returns
     -------
     (int, int)
-        Height and width in pixels. The pixels themselves are not looked at.
+        Height and width in pixels, as `read_picture` gives them. The pixels themselves are not
+        looked at, but for those of a PNG that holds metadata behind them.
 
     Raises
     ------
@@ -110,25 +120,22 @@ def picture_shape(path: str | os.PathLike[str]) -> tuple[int, int]:
     head = _head(path)
     with _one_line(path):
         if head.startswith(_NPY_SIGNATURE):
-            shape: tuple[int, ...] = np.load(path, mmap_mode="r", allow_pickle=False).shape
-            _count_channels(shape, path)
+            shape, _ = _npy_head(path)
+            check_channels(shape, path)
             return shape[0], shape[1]
-        if head.startswith(_TIFF_SIGNATURES):
-            import tifffile
-
-            with tifffile.TiffFile(path) as tiff:
-                page = _only_page(tiff, path)
-                return int(page.imagelength), int(page.imagewidth)
-        _, (width, height) = _pillow_mode_and_size(path)
-        return height, width
+        if head.startswith(tiff_pictures.SIGNATURES):
+            return tiff_pictures.shape(path)
+        if netpbm_pictures.is_netpbm(head):
+            return netpbm_pictures.shape(path)
+        return pillow_pictures.shape(path)
 
 
 def pixel_digest(path: str | os.PathLike[str]) -> str:
     """SHA-256 of the decoded pixels of a picture, row by row.
 
     The digest identifies what is seen, whatever the compression or metadata of the file. The bytes
-    are those of the decoded samples (before any conversion to grey), little-endian, row-major,
-    channels last. Shape and depth are not part of them.
+    are those of the decoded samples (upright, before any conversion to grey), little-endian,
+    row-major, channels last. Shape and depth are not part of them.
 
     Parameters
     ----------
@@ -148,8 +155,9 @@ def pixel_digest(path: str | os.PathLike[str]) -> str:
     return _digest(_decode(Path(path)))
 
 
-def _digest(pixels: NDArray[Any]) -> str:
-    little = np.ascontiguousarray(pixels.astype(pixels.dtype.newbyteorder("<"), copy=False))
+def _digest(samples: Samples) -> str:
+    values = samples.values
+    little = np.ascontiguousarray(values.astype(values.dtype.newbyteorder("<"), copy=False))
     return hashlib.sha256(little.data).hexdigest()
 
 
@@ -169,12 +177,13 @@ def write_picture(u: NDArray[np.floating[Any]], path: str | os.PathLike[str]) ->
     ------
     InputError
         If the suffix is none of these, no file can be written there (see
-        `keystab.utils.files.check_writable`), or `u` is no grey picture of finite values.
+        `keystab.utils.files.check_writable`), or `u` is no grey picture of finite values, or is
+        masked in part.
     """
     path = Path(path)
     check_writable(path, FORMATS)
     suffix = path.suffix.lower()
-    u = np.asarray(u)
+    u = np.asarray(unmasked(f"{path}: the picture", u))
     if u.dtype.kind not in "biuf":
         raise InputError(f"{path}: values of type {u.dtype} are no grey values; give real numbers")
     if u.ndim != 2 or u.size == 0:
@@ -204,39 +213,51 @@ def _require_finite(u: NDArray[np.floating[Any]], path: Path) -> None:
         )
 
 
-def _decode(path: Path) -> NDArray[Any]:
-    """Decode the samples as stored: (height, width) or (height, width, channels)."""
+def _decode(path: Path) -> Samples:
+    """Decode the samples as stored, upright."""
     head = _head(path)
     with _one_line(path):
         if head.startswith(_NPY_SIGNATURE):
-            pixels = np.load(path, allow_pickle=False)
-        elif head.startswith(_TIFF_SIGNATURES):
-            pixels = _decode_tiff(path)
+            samples = _decode_npy(path)
+        elif head.startswith(tiff_pictures.SIGNATURES):
+            samples = tiff_pictures.decode(path)
+        elif netpbm_pictures.is_netpbm(head):
+            samples = netpbm_pictures.decode(path)
         else:
-            pixels = _decode_by_pillow(path, _pillow_mode_and_size(path)[0])
-    if pixels.size == 0:
-        raise InputError(f"{path}: the picture has no pixels (shape {pixels.shape})")
-    return pixels
+            samples = pillow_pictures.decode(path)
+    if samples.values.size == 0:
+        raise InputError(f"{path}: the picture has no pixels (shape {samples.values.shape})")
+    return samples
+
+
+def _decode_npy(path: Path) -> Samples:
+    shape, dtype = _npy_head(path)
+    check_channels(shape, path)
+    if dtype.kind not in "buf":
+        raise InputError(
+            f"{path}: samples of type {dtype} have no agreed white; use unsigned integers or floats"
+        )
+    check_room(shape[0], shape[1], math.prod(shape[2:]) * dtype.itemsize, path)
+    values = np.load(path, allow_pickle=False)
+    return Samples(values, float(np.iinfo(dtype).max) if dtype.kind == "u" else 1.0)
+
+
+def _npy_head(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    array = np.load(path, mmap_mode="r", allow_pickle=False)
+    return array.shape, array.dtype
 
 
 def _head(path: Path) -> bytes:
     """First bytes of a file, which tell its format."""
     try:
         with path.open("rb") as file:
-            head = file.read(26)
+            return file.read(26)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; give the path of a {_READABLE} picture") from None
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder; give the path of a {_READABLE} picture") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be opened ({error.strerror})") from None
-    depth, colour_type = head[24:25], head[25:26]
-    if head.startswith(_PNG_SIGNATURE) and depth == b"\x10" and colour_type in _PNG_COLOUR_TYPES:
-        raise InputError(
-            f"{path}: a PNG with colour or alpha and 16 bits per channel would lose its lower 8 "
-            "bits; save it as 16-bit grey PNG or 16-bit TIFF"
-        )
-    return head
 
 
 @contextmanager
@@ -244,117 +265,32 @@ def _one_line(path: Path) -> Iterator[None]:
     """Turn whatever a decoder raises into an `InputError`."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a large picture is no reason to warn a user
+            warnings.simplefilter("ignore")  # what matters of a picture is raised
             yield
-    except InputError:
+    except (InputError, MemoryError):
         raise
     except Exception as error:  # decoders raise whatever they like
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: not a readable picture ({_READABLE}): {reason[:120]}") from None
 
 
-def _only_page(tiff: Any, path: Path) -> Any:
-    """Page of a TIFF that holds one picture; thumbnails and other reduced pages do not count."""
-    pages = [page for page in tiff.pages if not page.is_reduced]
-    series = tiff.series[0]  # ImageJ lists one page for a stack of pictures
-    n_pictures = max(len(pages), math.prod(series.shape) // max(1, math.prod(pages[0].shape)))
-    if n_pictures > 1:
-        raise InputError(f"{path}: the TIFF holds {n_pictures} pictures; keep one")
-    return pages[0]
-
-
-def _decode_tiff(path: Path) -> NDArray[Any]:
-    import tifffile
-
-    with tifffile.TiffFile(path) as tiff:
-        page = _only_page(tiff, path)
-        photometric = getattr(page.photometric, "name", "")
-        if photometric not in {"MINISBLACK", "MINISWHITE", "RGB"}:
-            return _decode_by_pillow(path, _pillow_mode(path))
-        if photometric == "MINISWHITE" and page.dtype is not None and page.dtype.kind == "f":
-            raise InputError(
-                f"{path}: in this TIFF of floats 0 is white (MINISWHITE) and nothing says what is "
-                "black; save it with 0 as black (MINISBLACK)"
-            )
-        try:
-            pixels = page.asarray()
-        except ValueError:  # a compression that needs a package we do not ask for
-            return _decode_by_pillow(path, _pillow_mode(path))
-        if page.axes == "SYX":  # one plane per channel
-            pixels = np.moveaxis(pixels, 0, -1)
-        if photometric == "MINISWHITE" and pixels.dtype.kind in {"b", "u"}:
-            pixels = ~pixels  # the largest value minus the sample
-        return pixels
-
-
-def _pillow_mode(path: Path) -> str:
-    from PIL import Image
-
-    with Image.open(path) as picture:
-        return picture.mode
-
-
-def _pillow_mode_and_size(path: Path) -> tuple[str, tuple[int, int]]:
-    """Colour mode, width and height of a file that holds one picture."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(path) as picture:
-            n_pictures = getattr(picture, "n_frames", 1)
-            # The further pictures of a JPEG (MPO) are previews and depth maps.
-            if n_pictures > 1 and picture.format != "MPO":
-                raise InputError(
-                    f"{path}: the {picture.format} file holds {n_pictures} pictures; keep one"
-                )
-            return picture.mode, picture.size
-    except UnidentifiedImageError:
-        raise InputError(
-            f"{path}: its content is none of PNG, JPEG, TIFF and .npy; give such a picture"
-        ) from None
-
-
-def _decode_by_pillow(path: Path, mode: str) -> NDArray[Any]:
-    import imageio.v3 as iio
-
-    # Pillow would hand over ink densities (CMYK) or Lab as if they were colours.
-    convert = {"mode": "RGB"} if mode in {"CMYK", "YCbCr", "LAB", "HSV"} else {}
-    return np.asarray(iio.imread(path, plugin="pillow", index=0, **convert))
-
-
-def _finite_grey(pixels: NDArray[Any], path: Path) -> NDArray[np.float64]:
-    grey = _grey(pixels, path)
+def _finite_grey(samples: Samples, path: Path) -> NDArray[np.float64]:
+    grey = _grey(samples, path)
     _require_finite(grey, path)
     return grey
 
 
-def _grey(pixels: NDArray[Any], path: Path) -> NDArray[np.float64]:
+def _grey(samples: Samples, path: Path) -> NDArray[np.float64]:
     """Grey float64 values of decoded samples."""
-    kind = pixels.dtype.kind
-    if kind == "b":
-        white = 1.0
-    elif kind == "u":
-        white = float(np.iinfo(pixels.dtype).max)
-    elif kind == "f":
-        white = 1.0
-    else:
-        raise InputError(
-            f"{path}: samples of type {pixels.dtype} have no agreed white; "
-            "use unsigned integers or floats"
-        )
-    channels = _count_channels(pixels.shape, path)
-    if pixels.ndim == 3 and channels < 3:  # grey, or grey and alpha
-        pixels = pixels[..., 0]
-    if pixels.ndim == 2:
-        return pixels.astype(np.float64) / white
-    red, green, blue = (pixels[..., c].astype(np.float64) for c in range(3))
-    return (LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue) / white
-
-
-def _count_channels(shape: tuple[int, ...], path: Path) -> int:
-    channels = shape[-1] if len(shape) == 3 else 1
-    if len(shape) not in (2, 3) or channels > 4:
-        raise InputError(
-            f"{path}: shape {shape} is no picture; expected (height, width) or "
-            "(height, width, 1 to 4 channels)"
-        )
-    return channels
+    values = samples.values
+    if values.ndim == 3 and check_channels(values.shape, path) < 3:  # grey, or grey and alpha
+        values = values[..., 0]
+    with np.errstate(all="ignore"):  # values that are not finite are refused soon
+        if values.ndim == 2:
+            grey = values.astype(np.float64, order="C")
+        else:
+            grey = LUMA[0] * values[..., 0].astype(np.float64, order="C")
+            for channel in (1, 2):
+                grey += LUMA[channel] * values[..., channel].astype(np.float64, order="C")
+        grey /= samples.white
+    return grey

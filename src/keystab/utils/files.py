@@ -27,8 +27,8 @@ def check_writable(path: str | os.PathLike[str], suffixes: Sequence[str] = ()) -
     Raises
     ------
     InputError
-        If the suffix is none of `suffixes`, a folder is in the place of the file, or its folder
-        cannot be made or written to.
+        If the suffix is none of `suffixes`, a folder or a device is in the place of the file, its
+        folder cannot be made or written to, or `path` is a link that leads nowhere.
 
     Examples
     --------
@@ -38,9 +38,10 @@ def check_writable(path: str | os.PathLike[str], suffixes: Sequence[str] = ()) -
     if suffixes and path.suffix.lower() not in suffixes:
         allowed = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
         raise InputError(f"{path}: cannot write '{path.suffix}'; use {allowed}")
-    if os.path.isdir(path):
+    place = _place(path)
+    if os.path.isdir(place):
         raise InputError(f"{path} is a folder; give a file name")
-    _check_folder(path)
+    _check_folder(place)
 
 
 @contextmanager
@@ -52,7 +53,8 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     is interrupted, the sibling is deleted and `path` is left as it was. A process killed outright
     leaves hidden siblings behind, never a half-written `path`; the next one that writes `path`
     removes them. A file replaces only a file, and a
-    folder only a folder.
+    folder only a folder. Where `path` is a symbolic link, all this happens where it leads to, and
+    the link stays.
 
     Parameters
     ----------
@@ -67,8 +69,8 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the folder of `path` cannot be made or written to, or the block wrote a file where
-        there is a folder, or the other way round.
+        If the folder of `path` cannot be made or written to, the block wrote a file where there
+        is a folder, or the other way round, there is a device, or `path` is a link in a circle.
     OSError
         As the block raised it, but naming `path` instead of the temporary sibling.
 
@@ -83,33 +85,46 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     >>> target.read_text()
     '42'
     """
-    target = Path(path)
+    path = Path(path)
+    target = _place(path)
     _check_folder(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     _remove_leftovers(target)
-    part = target.with_name(f".part-{os.getpid()}-{target.name}")
+    # Writers go by the suffix, which may differ from that of the file that a link leads to.
+    suffix = path.suffix if path.suffix != target.suffix else ""
+    part = target.with_name(f".part-{os.getpid()}-{target.name}{suffix}")
     try:
         try:
             _remove(part)
             yield part
-            _put(part, target)
+            _put(part, target, path)
         finally:
             _remove(part)
     except OSError as error:
-        _name(target, part, error)
+        _name(path, part, error)
         raise
 
 
-def _put(part: Path, target: Path) -> None:
-    """Rename a complete file or folder to where it belongs."""
+def _place(path: Path) -> Path:
+    """Where a path leads to: itself, or what it points to where it is a symbolic link."""
+    place = Path(os.path.realpath(path)) if os.path.islink(path) else path
+    if os.path.islink(place):
+        raise InputError(f"{path} is a link that leads in a circle; give a file name")
+    if os.path.exists(place) and not (os.path.isfile(place) or os.path.isdir(place)):
+        raise InputError(f"{path} is neither a file nor a folder; give another name")
+    return place
+
+
+def _put(part: Path, target: Path, path: Path) -> None:
+    """Rename a complete file or folder to where it belongs; `path` is what that is called."""
     if not target.is_dir():
         if part.is_dir() and target.exists():
-            raise InputError(f"{target} is a file; give the name of a folder")
+            raise InputError(f"{path} is a file; give the name of a folder")
         part.replace(target)
         return
     part.stat()  # raises if the block wrote nothing
     if not part.is_dir():
-        raise InputError(f"{target} is a folder; give a file name")
+        raise InputError(f"{path} is a folder; give a file name")
     # A folder cannot be renamed onto a folder that holds files.
     old = target.with_name(f".old-{os.getpid()}-{target.name}")
     _remove(old)
@@ -124,7 +139,8 @@ def _put(part: Path, target: Path) -> None:
 
 def _remove_leftovers(target: Path) -> None:
     """Remove the hidden siblings of a path that killed processes left."""
-    pattern = re.compile(rf"\.(?:part|old)-(\d+)-{re.escape(target.name)}")
+    # After the name there may be the suffix of a link to it.
+    pattern = re.compile(rf"\.(?:part|old)-(\d+)-{re.escape(target.name)}(?:\.[^.]*)?")
     for sibling in target.parent.iterdir():
         if (found := pattern.fullmatch(sibling.name)) and not _runs(int(found[1])):
             _remove(sibling)
