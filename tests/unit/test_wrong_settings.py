@@ -112,7 +112,7 @@ WRONG = [
 def said_of(overlay: str) -> str:
     """What is said before anything runs, of config/config.yaml under an overlay."""
     given = copy.deepcopy(GIVEN)
-    settings._merge(given, yaml.safe_load(overlay))
+    settings.merge(given, yaml.safe_load(overlay))
     with pytest.raises(InputError) as caught:
         feasibility.require(settings.checked(given, SCHEMA), ROOT)
     return str(caught.value)
