@@ -22,7 +22,7 @@ def copy_beside_modules(loops: Path, package_folder: Path) -> None:
     loops : Path
         Folder that numba was told.
     package_folder : Path
-        Folder of the package, whose rooms get the loops in their ``__pycache__``.
+        Folder of the package, whose modules get their loops in a ``__pycache__`` beside them.
     """
     for module in modules_of_loops(package_folder):
         path = package_folder.joinpath(*module.split(".")[1:])

@@ -24,7 +24,7 @@ INTERPRETER = 0.015  # seconds until the first import, `python -I -S -c pass`
 # What reads and writes: libraries, modules of keystab, calls of the system.
 STORES = re.compile(
     r"/site-packages/(zarr|numcodecs|xarray|pyarrow|PIL|tifffile)/"
-    r"|/keystab/(tables|files|seals|pictures|zarr_groups)\.py"
+    r"|/keystab/(utils/files|io/(tables|checksums|pictures|zarr_groups))\.py"
     r"|^~.*(posix\.|_io\.|hashlib)"
 )
 IMPORTING = re.compile(r"importlib|<module>|^~.*(__import__|exec)")
@@ -64,7 +64,7 @@ def outermost(call: Call, callers: dict[Call, tuple[int, int, float, float]]) ->
     What such functions import on their way is taken off again.
 
     >>> job = ("/x/keystab/stages/semigroup.py", 3, "main")
-    >>> table = ("/x/keystab/tables.py", 9, "write")
+    >>> table = ("/x/keystab/io/tables.py", 9, "write")
     >>> outermost(table, {job: (1, 1, 0.1, 2.0)})
     2.0
     >>> outermost(("/x/site-packages/pyarrow/csv.py", 1, "write"), {table: (1, 1, 0.1, 1.5)})

@@ -63,9 +63,9 @@ def figure(name: str, config: dict[str, Any]) -> dict[str, Any]:
 
 
 def claims(config: dict[str, Any]) -> list[dict[str, Any]]:
-    """The ledger, verdict by verdict."""
-    ledger = json.loads((ROOT / config["results"] / "claims.json").read_text())
-    return sorted(ledger, key=lambda claim: list(VERDICTS).index(claim["verdict"]))
+    """The claims, verdict by verdict."""
+    listed = json.loads((ROOT / config["results"] / "claims.json").read_text())
+    return sorted(listed, key=lambda claim: list(VERDICTS).index(claim["verdict"]))
 
 
 def numbers(claim: dict[str, Any]) -> list[str]:
@@ -118,7 +118,7 @@ def main(arguments: list[str]) -> int:
     except InputError as problem:
         sys.exit(f"error: {problem}")
     config = study.settings
-    ledger = claims(config)
+    listed = claims(config)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(ROOT / "workflow/report"), autoescape=True
     )
@@ -127,8 +127,8 @@ def main(arguments: list[str]) -> int:
         version=keystab.__version__,
         draft=config["draft"],
         figures=[figure(name, config) for name in FIGURES],
-        claims=ledger,
-        verdicts={name: sum(one["verdict"] == name for one in ledger) for name in VERDICTS},
+        claims=listed,
+        verdicts={name: sum(one["verdict"] == name for one in listed) for name in VERDICTS},
         graph=drawn(graph, {*FIGURES, "claims"}),
         costs=costs(ROOT / config["logs"]),
         machine=f"{os.cpu_count()} cores ({platform.machine()}), {platform.system()}, "

@@ -198,7 +198,7 @@ def test_what_a_table_cannot_give_is_an_error(column, take, rows, says):
 
 
 def verdict(**changes) -> str:
-    return verdicts.judge(claim(**changes), TABLES).verdict
+    return verdicts.outcome_of(claim(**changes), TABLES).verdict
 
 
 WEAKER = {"criterion": "drop > 0", "words": "it falls at least"}
@@ -216,7 +216,7 @@ def test_every_verdict_can_be_given():
 
 
 def test_a_criterion_that_holds_needs_no_condition():
-    judged = verdicts.judge(claim(condition=WEAKER), TABLES)
+    judged = verdicts.outcome_of(claim(condition=WEAKER), TABLES)
     assert (judged.verdict, judged.note) == ("reproduced", "")
 
 
@@ -227,37 +227,39 @@ def test_a_condition_that_fails_too_saves_nothing():
 
 
 def test_the_condition_is_told():
-    judged = verdicts.judge(claim(criterion="fine > 0.5", condition=WEAKER, note="See."), TABLES)
+    judged = verdicts.outcome_of(
+        claim(criterion="fine > 0.5", condition=WEAKER, note="See."), TABLES
+    )
     assert judged.note == "Condition: it falls at least. See."
 
 
 def test_other_numbers_flip_the_verdict():
     flipped = {"rates": RATES.assign(rate=RATES["rate"] * 2)}
-    assert verdicts.judge(claim(), TABLES).verdict == "reproduced"
-    assert verdicts.judge(claim(), flipped).verdict == "not reproduced"
+    assert verdicts.outcome_of(claim(), TABLES).verdict == "reproduced"
+    assert verdicts.outcome_of(claim(), flipped).verdict == "not reproduced"
 
 
 def test_missing_rows_make_a_claim_not_testable():
     coarse = {"rates": RATES[RATES["n_spo"] > 3]}
-    judged = verdicts.judge(claim(), coarse)
+    judged = verdicts.outcome_of(claim(), coarse)
     assert judged.verdict == "not testable"
     assert judged.note == "Missing: rates has no row with n_spo == 3."
     # Numbers that no criterion uses may be missing.
-    assert verdicts.judge(claim(criterion="fine > 0"), coarse).verdict == "reproduced"
+    assert verdicts.outcome_of(claim(criterion="fine > 0"), coarse).verdict == "reproduced"
     # A condition that cannot be asked does not excuse.
-    judged = verdicts.judge(claim(criterion="fine > 0.5", condition=WEAKER), coarse)
+    judged = verdicts.outcome_of(claim(criterion="fine > 0.5", condition=WEAKER), coarse)
     assert judged.verdict == "not reproduced" and "Its condition is not tested" in judged.note
 
 
 def test_nothing_over_nothing_is_not_testable():
     value = ENTRY["value"] | {"ratio": "(fine - fine) / (coarse - coarse)"}
-    judged = verdicts.judge(claim(value=value, criterion="ratio < 1"), TABLES)
+    judged = verdicts.outcome_of(claim(value=value, criterion="ratio < 1"), TABLES)
     assert (judged.verdict, judged.note) == ("not testable", "Missing: no number: ratio.")
 
 
 def test_errors_name_the_claim():
     with pytest.raises(InputError, match="^claim falls: rates: |^claim falls: .*does not know"):
-        verdicts.judge(claim(), {"rates": RATES.drop(columns="rate")})
+        verdicts.outcome_of(claim(), {"rates": RATES.drop(columns="rate")})
 
 
 # The file of claims

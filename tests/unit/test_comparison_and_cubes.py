@@ -17,8 +17,8 @@ from keystab.experiments.local_volumes import (
 )
 from keystab.experiments.sampling_stability import (
     change_counts,
+    keypoints_of_samplings,
     long_matches,
-    match_samplings,
     positions_of_matches,
     summary,
 )
@@ -61,7 +61,7 @@ def test_new_and_lost_refer_to_the_neighbouring_sampling():
 def test_matches_lead_back_to_the_detections_of_each_sampling():
     common = detections([(3, 10.0), (3, 30.0), (4, 10.1), (5, 9.9), (5, 30.2)])
     samplings = [3, 4, 5, 6]
-    matched = match_samplings(common, samplings, SAME)
+    matched = keypoints_of_samplings(common, samplings, SAME)
     assert matched.gap == 0
     assert matched.keypoints["n_samplings"].tolist() == [3, 2]
     assert matched.keypoints["stability"].tolist() == [0.75, 0.5]

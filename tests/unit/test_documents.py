@@ -7,6 +7,7 @@ import io
 import re
 import shlex
 import subprocess
+import tomllib
 from itertools import takewhile
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 import yaml
 
-from keystab import scale_space
+from keystab import __version__, scale_space
 from keystab.camera.views import ViewSpec
 from keystab.cli.parser import build_parser
 from keystab.io.scale_space_store import write_scale_space
@@ -165,3 +166,9 @@ def test_example_of_stores_runs(monkeypatch, tmp_path, capsys):
     assert sizes.startswith(str(dict(zip(("scale", "y", "x"), space.shape, strict=True))))
     assert set(eval(peak.split("}")[0] + "}")) == {"sigma", "y", "x"}
     assert views == "('view', 'y', 'x') 1.1 10.0"
+
+
+def test_the_version_is_the_same_wherever_it_is_said():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["version"] == __version__
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text()

@@ -36,7 +36,7 @@ NAMES = ["y", "x", "sigma", "sign"]
 
 
 def take_views(folder: Path, name: str, **changes: str) -> list[str]:
-    """Simulate a set of views of the scene; its store and its seal."""
+    """Simulate a set of views of the scene; its store and its checksums."""
     options = STILL | {
         "reference": str(folder / "scene.tif"),
         "reference-sha256": "None",

@@ -13,7 +13,7 @@ from keystab import __version__
 from keystab.errors import InputError
 from keystab.figures import style
 from keystab.figures._render import check_tables, main, read_tables, save
-from keystab.io.figure_metadata import PNG_KEY, Passport, digests_of
+from keystab.io.figure_metadata import PNG_KEY, FigureMetadata, digests_of
 from keystab.io.tables import write_table
 
 NUMBERS = (*range(1, 13), "S1", "S2", "S3", "S4")
@@ -65,8 +65,8 @@ def test_the_command_writes_what_the_library_writes(drawn, folder, tmp_path):
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["a.pdf"]
-    passport = Passport("a", __version__, None, None, {"draft": "False"}, digests_of(paths))
-    save(drawn[2], tmp_path / "b.pdf", passport=passport)
+    metadata = FigureMetadata("a", __version__, None, None, {"draft": "False"}, digests_of(paths))
+    save(drawn[2], tmp_path / "b.pdf", metadata=metadata)
     assert (tmp_path / "new" / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
 
 

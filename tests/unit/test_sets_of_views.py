@@ -22,8 +22,8 @@ from keystab.detection.view_detector import Detector, detect_in_view
 from keystab.experiments.view_stability import (
     count_table,
     curve_table,
-    match_views,
-    precision_table,
+    keypoints_of_views,
+    localization_table,
     scale_table,
 )
 from keystab.matching.common_range import CommonRange, common_scales
@@ -129,9 +129,9 @@ def test_fine_sampling_is_markedly_more_stable_and_precise():
     everywhere = CommonRange(specs, scene().shape, 17.0, 1.1 * 2 ** (1 / 3))
     always, spread = {}, {}
     for n_spo in (3, 15):
-        matching = match_views(everywhere.common(refined(specs, n_spo)), len(specs), SAME)
+        matching = keypoints_of_views(everywhere.common(refined(specs, n_spo)), len(specs), SAME)
         always[n_spo] = count_table(matching, {})["share_always"].item()
-        spread[n_spo] = precision_table(matching, {}, 0.5, 0)["mean"].iloc[0]
+        spread[n_spo] = localization_table(matching, {}, 0.5, 0)["mean"].iloc[0]
     assert always[15] > always[3] + 0.15
     assert spread[15] < spread[3] / 4
 
@@ -251,7 +251,7 @@ def by_hand(n_views: int, jitter: float = 0.0) -> tuple[list[ViewSpec], pd.DataF
 
 def test_counts_curves_and_precision_of_known_detections():
     specs, table = by_hand(8, jitter=0.03)
-    matching = match_views(CommonRange(specs, (600, 800), 3, 1.4).common(table), 8, SAME)
+    matching = keypoints_of_views(CommonRange(specs, (600, 800), 3, 1.4).common(table), 8, SAME)
     counts = count_table(matching, {"n_spo": 3}).iloc[0]
     assert (counts["n_unique"], counts["n_always"], counts["gap"]) == (10, 5, 0)
     assert counts["mean_detections"] == 7.5 and counts["share_always"] == 0.5
@@ -259,7 +259,7 @@ def test_counts_curves_and_precision_of_known_detections():
     expected = [100] * 4 + [50] * 4
     assert curve["percentage_of_unique"].tolist() == expected
     assert (curve["low"] <= curve["percentage_of_unique"]).all()
-    spread = precision_table(matching, {"n_spo": 3}, 0.5, 100).set_index("quantity")
+    spread = localization_table(matching, {"n_spo": 3}, 0.5, 100).set_index("quantity")
     # Half of the views lie 0.03 px above, half below: s^2 = m / (m - 1) 0.03^2, m = 8 and m = 4.
     known = 0.03 * (math.sqrt(8 / 7) + math.sqrt(4 / 3)) / 2
     assert spread["mean"]["location"] == pytest.approx(known, abs=1e-12)

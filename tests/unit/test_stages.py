@@ -90,9 +90,9 @@ def test_stored_and_streamed_detections_are_the_same_to_the_bit(reference, tmp_p
     store = ["--store", str(tmp_path / "n4")]
     digest = ["--store-digest", str(tmp_path / "n4.sha256")]
     assert scale_space.main([*views, "--n-spo", "4", *DETECTOR, *store, *digest]) == 0
-    sealed = [*store, "--store-digest", str(tmp_path / "n4.sha256")]
+    checked = [*store, "--store-digest", str(tmp_path / "n4.sha256")]
     assert detect.main(detect_arguments(tmp_path, "streamed")) == 0
-    assert detect.main(detect_arguments(tmp_path, "stored", *sealed)) == 0
+    assert detect.main(detect_arguments(tmp_path, "stored", *checked)) == 0
     for name in ("", "_traces"):
         streamed, stored = (tmp_path / f"{how}{name}.parquet" for how in ("streamed", "stored"))
         assert streamed.read_bytes() == stored.read_bytes()
@@ -111,9 +111,10 @@ def views_arguments(folder: Path, *more: str) -> list[str]:
 def test_stored_and_streamed_detections_of_a_set_are_the_same_to_the_bit(reference, tmp_path):
     several = {"shift_y": "0.0 0.3", "step": "3 4", "whole": "True", "guard": "2"}
     assert simulate.main(view_arguments(reference, tmp_path, **several)) == 0
-    stores, seal = str(tmp_path / "stores"), str(tmp_path / "stores.sha256")
+    stores, checksums = str(tmp_path / "stores"), str(tmp_path / "stores.sha256")
     assert (
-        scale_spaces.main(views_arguments(tmp_path, "--store", stores, "--store-digest", seal)) == 0
+        scale_spaces.main(views_arguments(tmp_path, "--store", stores, "--store-digest", checksums))
+        == 0
     )
     search = [
         "--guard",
@@ -128,7 +129,10 @@ def test_stored_and_streamed_detections_of_a_set_are_the_same_to_the_bit(referen
         "0.5",
     ]
     written = {}
-    for how, more in (("streamed", []), ("stored", ["--store", stores, "--store-digest", seal])):
+    for how, more in (
+        ("streamed", []),
+        ("stored", ["--store", stores, "--store-digest", checksums]),
+    ):
         tables = [tmp_path / f"{how}_{what}.parquet" for what in ("extrema", "traces")]
         names = ["--extrema", str(tables[0]), "--traces", str(tables[1])]
         assert detect_views.main(views_arguments(tmp_path, *search, *names, *more)) == 0
@@ -147,8 +151,8 @@ def test_store_of_another_scale_space_is_refused(reference, tmp_path, capsys):
     digest = ["--store-digest", str(tmp_path / "n5.sha256")]
     scale_space.main([*views, "--n-spo", "5", *DETECTOR, *store, *digest])
     capsys.readouterr()
-    sealed = [*store, "--store-digest", str(tmp_path / "n5.sha256")]
-    assert detect.main(detect_arguments(tmp_path, "wrong", *sealed)) == 2
+    checked = [*store, "--store-digest", str(tmp_path / "n5.sha256")]
+    assert detect.main(detect_arguments(tmp_path, "wrong", *checked)) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "n_spo = 5, wanted is 4" in said
     assert not list(tmp_path.glob("wrong*"))
@@ -185,14 +189,14 @@ def test_a_damaged_scale_space_is_refused(reference, tmp_path, capsys):
     data[100] ^= 1
     chunk.write_bytes(data)
     capsys.readouterr()
-    sealed = ["--store", str(store), "--store-digest", str(digest)]
-    assert detect.main(detect_arguments(tmp_path, "found", *sealed)) == 2
+    checked = ["--store", str(store), "--store-digest", str(digest)]
+    assert detect.main(detect_arguments(tmp_path, "found", *checked)) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and f"{chunk.relative_to(store)} is damaged" in said
     assert not list(tmp_path.glob("found*"))
 
 
-def test_stores_are_never_searched_without_their_seal(tmp_path, capsys):
+def test_stores_are_never_searched_without_their_checksums(tmp_path, capsys):
     with pytest.raises(SystemExit):
         detect.main(detect_arguments(tmp_path, "found", "--store", str(tmp_path / "n4")))
     assert "--store, --store-digest go together" in capsys.readouterr().err

@@ -15,7 +15,7 @@ import pytest
 from keystab.camera.views import ViewSpec
 from keystab.errors import InputError
 from keystab.io import scale_space_store, view_store, zarr_groups
-from keystab.io.checksums import seal
+from keystab.io.checksums import checksums
 from keystab.utils import memory
 
 
@@ -101,7 +101,7 @@ def test_same_scale_space_same_bytes(store, tmp_path):
     scale_space_store.write_scale_space(
         Space(), tmp_path / "again", {"image_sha256": "abc"}, tile=32
     )
-    assert seal(tmp_path / "again") == seal(store)
+    assert checksums(tmp_path / "again") == checksums(store)
 
 
 def test_an_older_store_is_replaced(store):

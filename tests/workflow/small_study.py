@@ -39,15 +39,15 @@ rule checksums:
 
 rule views:
     input: "config/scene.txt"
-    output: store=directory("results/views/still"), seal="results/views/still.sha256"
+    output: store=directory("results/views/still"), checksums="results/views/still.sha256"
     params: blur=config["blur"], lock=LOCK
     log: "logs/views.log"
     benchmark: "logs/benchmarks/views.tsv"
     message: "Taking views"
-    shell: "python workflow/jobs.py views {output.store} {output.seal} {params.blur} {input} >{log} 2>&1"
+    shell: "python workflow/jobs.py views {output.store} {output.checksums} {params.blur} {input} >{log} 2>&1"
 
 rule keypoints:
-    input: store=ancient("results/views/still"), seal="results/views/still.sha256"
+    input: store=ancient("results/views/still"), checksums="results/views/still.sha256"
     output: "results/keypoints/still.csv"
     params: lock=LOCK
     log: "logs/keypoints.log"
@@ -107,24 +107,24 @@ JOBS = '''
 import sys
 from pathlib import Path
 
-def views(store, seal, blur, scene):
-    from keystab.io.checksums import write_seal
+def views(store, checksums, blur, scene):
+    from keystab.io.checksums import write_checksums
     Path(store).mkdir(parents=True)
     Path(store, "a").write_text("n_spo,found\\n")
     Path(store, "b").write_text(f"3,{blur}\\n" + Path(scene).read_text())
-    write_seal(store, seal)
+    write_checksums(store, checksums)
 
 def fig1(pdf, png, code, lock, table):
     from PIL import Image, PngImagePlugin
     from pypdf import PdfWriter
-    from keystab.io.figure_metadata import PNG_KEY, Passport, digests_of
-    passport = Passport("fig1", "0", code, lock, {"draft": "False"}, digests_of([Path(table)]))
+    from keystab.io.figure_metadata import PNG_KEY, FigureMetadata, digests_of
+    metadata = FigureMetadata("fig1", "0", code, lock, {"draft": "False"}, digests_of([Path(table)]))
     writer = PdfWriter()
     writer.add_blank_page(9, 9)
-    writer.add_metadata({"/Keywords": passport.to_text()})
+    writer.add_metadata({"/Keywords": metadata.to_text()})
     writer.write(pdf)
     text = PngImagePlugin.PngInfo()
-    text.add_text(PNG_KEY, passport.to_text())
+    text.add_text(PNG_KEY, metadata.to_text())
     Image.new("L", (9, 9)).save(png, pnginfo=text)
 
 globals()[sys.argv[1]](*sys.argv[2:])
@@ -132,7 +132,7 @@ globals()[sys.argv[1]](*sys.argv[2:])
 
 
 def write(folder: Path, code: str) -> Study:
-    """Write the study; `code` is what its figure's passport says about the code."""
+    """Write the study; `code` is what its figure's metadata says about the code."""
     files = {
         "Snakefile": SNAKEFILE.replace("CODE", repr(code)),
         "workflow/schemas/config.schema.yaml": SCHEMA,

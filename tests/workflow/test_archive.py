@@ -102,7 +102,7 @@ def test_what_is_left_out_is_listed_with_digests(packed, ran):
         rows = file.read(LEFT_OUT).decode().splitlines()
         guide = file.read("ARCHIVE.md").decode()
     keypoints = (ran.project / "results/keypoints/still.csv").read_bytes()
-    seal = (ran.project / "results/views/still.sha256").read_bytes()
+    checksums = (ran.project / "results/views/still.sha256").read_bytes()
     size = sum(
         path.stat().st_size
         for path in (ran.project / "results/views/still").iterdir()
@@ -111,7 +111,7 @@ def test_what_is_left_out_is_listed_with_digests(packed, ran):
     assert rows == [
         "path,bytes,sha256,rule",
         f"results/keypoints/still.csv,{len(keypoints)},{hashlib.sha256(keypoints).hexdigest()},keypoints",
-        f"results/views/still,{size},{hashlib.sha256(seal).hexdigest()},views",
+        f"results/views/still,{size},{hashlib.sha256(checksums).hexdigest()},views",
     ]
     assert "| `results/keypoints` | 1 |" in guide and "| `results/views` | 1 |" in guide
 
@@ -193,7 +193,7 @@ def test_a_forged_table_does_not_pass_though_all_digests_were_adapted(packed, cl
     assert "digests" not in problems
 
 
-def test_a_forged_seal_does_not_pass(packed, tmp_path):
+def test_forged_checksums_do_not_pass(packed, tmp_path):
     changes: dict[str, bytes | None] = {"results/views/still.sha256": 64 * b"0" + b"  a\n"}
     with unpacked(rewritten(packed, tmp_path / "t.zip", changes, True)) as held:
         elsewhere = result_checks.left_out_digests(held.folder) | dict(held.digests)

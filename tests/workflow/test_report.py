@@ -41,6 +41,7 @@ def report(project: Project) -> tuple[subprocess.CompletedProcess[str], str]:
 
 def test_all_of_a_run_in_one_file(finished):
     (finished.folder / "results/quick/claims.json").write_text(json.dumps([CLAIM]))
+    assert finished.snakemake(*QUICK, "--touch", "--forcerun", "checksums").returncode == 0
     run, page = report(finished)
     assert run.returncode == 0, run.stderr
     loaded = re.findall(r'(?:src|srcset|<link[^>]*href)="([^"]*)"|url\(|@import|<script', page)

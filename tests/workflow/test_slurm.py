@@ -109,6 +109,6 @@ def test_jobs_through_slurm(slurm, tmp_path):
     run = local.snakemake(*QUICK, "--", *TARGETS)
     assert run.returncode == 0, run.stdout
     assert files(project) == files(local)
-    # The seals are equal; each holds for the chunks of its own store.
+    # The checksums are equal; each holds for the chunks of its own store.
     for one in (project, local):
         checksums.verify(one.folder / STORE, one.folder / SEAL)

@@ -96,7 +96,7 @@ def studies_of_pictures():
 
 def verdicts_of_pictures(_wildcards):
     """Verdicts on all pictures."""
-    return [study.ledger for study in studies_of_pictures()]
+    return [study.report for study in studies_of_pictures()]
 
 
 def names_of_pictures(_wildcards):

@@ -117,8 +117,8 @@ def detect_keypoints(
     validation.count("max_iterations", max_iterations, least=1)
     validation.limit("max_offset", max_offset, above=0)
     validation.integer("n_spo", n_spo, least=1)
-    validation.truth("refine", refine)
-    validation.truth("scale_moves", scale_moves)
+    validation.boolean("refine", refine)
+    validation.boolean("scale_moves", scale_moves)
     if move not in MOVES:
         raise InputError(f"move is {move!r}, allowed are {' and '.join(MOVES)}: change move")
     octaves = []

@@ -132,7 +132,7 @@ class BandLimitedSearch:
         return len(self.x_starts)
 
     def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[int, int]]]:
-        """Samples of one column of blocks that may be extrema; see `block_scan.gathered`."""
+        """Samples of one column of blocks that may be extrema; see `gathered`."""
         _, lower, upper = self.space.blurs
         y_axis, x_axis, source = self.y_axis, self.x_axis, self.space.source
         height, width = self.y_rows.shape[2], int(x_axis.n_frequencies.max())

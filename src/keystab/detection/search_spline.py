@@ -207,7 +207,7 @@ class InterpolatedSearch:
         return np.ascontiguousarray((bound[lower] + bound[upper]).transpose(1, 0, 2))
 
     def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[int, int]]]:
-        """Samples of one column of blocks that may be extrema; see `block_scan.gathered`."""
+        """Samples of one column of blocks that may be extrema; see `gathered`."""
         source, blocks = self.source, self.x_blocks(column)
         _, lower, upper = self.space.blurs
         nodes, expand = expansion(self.length)

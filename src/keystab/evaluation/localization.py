@@ -17,7 +17,7 @@ from keystab.evaluation.intervals import BOTH, Purpose, percentile_interval, tab
 from keystab.matching.unique_keypoints import gather
 
 
-def precision(
+def localization(
     detections: pd.DataFrame, found: NDArray[np.intp], minimum_share: float = 0.5
 ) -> pd.DataFrame:
     r"""Spread of each keypoint over the sets in which it is detected (section 5.5).
@@ -71,7 +71,7 @@ def precision(
     )
 
 
-def mean_precision(
+def mean_localization(
     detections: pd.DataFrame,
     found: NDArray[np.intp],
     minimum_share: float = 0.5,
@@ -80,12 +80,12 @@ def mean_precision(
     resample: Collection[str] = BOTH,
     confidence: float = 0.95,
 ) -> pd.DataFrame:
-    """Mean of `precision` over the keypoints seen in at least half of the images (figures 7c, 8b).
+    """Mean of `localization` over keypoints seen in at least half of the images (figures 7c, 8b).
 
     Parameters
     ----------
     detections, found, minimum_share
-        See `precision`.
+        See `localization`.
     n_resamples, purpose, resample, confidence
         See `stability_curve`.
 
@@ -100,7 +100,7 @@ def mean_precision(
     Sets drawn with replacement repeat, so that the variance of a resample of a keypoint seen m
     times is on average (m - 1) / m of the variance that it came from; this is undone.
     """
-    table = precision(detections, found, minimum_share)
+    table = localization(detections, found, minimum_share)
     columns = table[["sd_location", "sd_log2_sigma"]]
     low, high = np.full(2, np.nan), np.full(2, np.nan)
     if n_resamples and len(table):

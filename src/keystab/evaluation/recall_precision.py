@@ -79,7 +79,7 @@ def _paired(
     return partner, near
 
 
-def judged(
+def recall_and_precision(
     detections: pd.DataFrame,
     truth: pd.DataFrame,
     counted: NDArray[np.bool_],
@@ -178,8 +178,8 @@ def mean_over_views(
     Returns
     -------
     dict
-        ``n_views``; means over the views of `judged`'s numbers, with the intervals of recall and
-        precision from the spread of the views (mean and 1.96 standard errors).
+        ``n_views``; means over the views of `recall_and_precision`'s numbers, with the intervals of
+        recall and precision from the spread of the views (mean and 1.96 standard errors).
     """
     low, high = limits
     wanted = truth["sigma"].between(low, high).to_numpy()
@@ -187,7 +187,7 @@ def mean_over_views(
     for view in range(n_views):
         here = detections[detections["view"] == view].reset_index(drop=True)
         counted = here[scale_column].between(low, high).to_numpy()
-        rows.append(judged(here, truth, counted, wanted, **(tolerances or {})))
+        rows.append(recall_and_precision(here, truth, counted, wanted, **(tolerances or {})))
     each = pd.DataFrame(rows)
     result: dict[str, Any] = {"n_views": n_views}
     result |= {str(name): float(value) for name, value in each.mean().items()}

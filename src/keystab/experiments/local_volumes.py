@@ -1,4 +1,4 @@
-"""Cubes of samples around keypoints, to look at their surroundings (section 5.4, figure 6)."""
+"""Cubes of samples around keypoints, to look at their neighbourhood (section 5.4, figure 6)."""
 
 from __future__ import annotations
 

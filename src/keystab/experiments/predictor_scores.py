@@ -45,7 +45,7 @@ Key = tuple[str, str]
 """Name of a predictor or model, and how it was validated."""
 
 
-class _Judged(NamedTuple):
+class _Evaluated(NamedTuple):
     """Scores of the labelled detections of one picture, and what follows from them."""
 
     among: Detections
@@ -162,12 +162,12 @@ def score_predictors(
         learnt = _model_scores(table, inputs, good, labelled)
         for (model, validation), score in learnt.items():
             table[f"{what}_{model}_{validation}"] = score
-        judged = {
-            name: _judged(table, given | learnt, good, labelled & (table["picture"] == name),
+        evaluated = {
+            name: _evaluated(table, given | learnt, good, labelled & (table["picture"] == name),
                           n_resamples)
             for name in pictures
         }  # fmt: skip
-        results.append(tuple(part.assign(label=what) for part in _tables(judged)))
+        results.append(tuple(part.assign(label=what) for part in _tables(evaluated)))
     auc, gain, roc = (pd.concat(parts, ignore_index=True) for parts in zip(*results, strict=True))
     return Scored(table, _label_first(auc), _label_first(gain), _label_first(roc))
 
@@ -192,13 +192,13 @@ def _model_scores(
     }
 
 
-def _judged(
+def _evaluated(
     table: pd.DataFrame,
     given: Mapping[Key, NDArray[np.float64]],
     good: NDArray[np.bool_],
     here: NDArray[np.bool_] | pd.Series,
     n_resamples: int,
-) -> _Judged:
+) -> _Evaluated:
     """Areas of all scores among the labelled detections of one picture."""
     rows = np.flatnonzero(here)
     block = table["block"].to_numpy()[rows]
@@ -208,7 +208,7 @@ def _judged(
     # The same resamples for all scores: their differences have intervals, too.
     among = Detections.in_blocks(good[rows], stratum, block, n_resamples, purpose)
     own = {key: score[rows] for key, score in given.items()}
-    return _Judged(
+    return _Evaluated(
         among,
         len(np.unique(block)),
         own,
@@ -216,12 +216,12 @@ def _judged(
     )
 
 
-def _tables(judged: Mapping[str, _Judged]) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+def _tables(evaluated: Mapping[str, _Evaluated]) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Areas, gains and curves of all pictures."""
     rows: list[dict[str, Any]] = []
     gains: list[dict[str, Any]] = []
     curves = [_no_curve()]
-    for name, picture in judged.items():
+    for name, picture in evaluated.items():
         for (predictor, validation), area in picture.areas.items():
             score = picture.scores[predictor, validation]
             rows.append(
@@ -236,7 +236,7 @@ def _tables(judged: Mapping[str, _Judged]) -> tuple[pd.DataFrame, pd.DataFrame, 
                     "n_blocks": picture.n_blocks,
                 }
             )
-        others = [judged[other] for other in judged if other != name]
+        others = [evaluated[other] for other in evaluated if other != name]
         drawn: dict[str, Key] = {}
         for model, used in MODELS.items():
             best = _best(others, used)
@@ -300,7 +300,7 @@ def _of(statistic: Any, score: NDArray[np.float64], among: Detections) -> NDArra
     return samples
 
 
-def _best(pictures: Sequence[_Judged], used: Sequence[str]) -> str | None:
+def _best(pictures: Sequence[_Evaluated], used: Sequence[str]) -> str | None:
     """Single predictor with the largest mean area over some pictures."""
     if not pictures:
         return None

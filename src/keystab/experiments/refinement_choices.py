@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.detection.refinement import MOST_MODELS, refined_table, trace
-from keystab.evaluation.recall_precision import judged, partners, with_positions
+from keystab.evaluation.recall_precision import partners, recall_and_precision, with_positions
 
 if TYPE_CHECKING:
     from keystab.scalespace.dog import ScaleSpace
@@ -101,7 +101,8 @@ def kept_and_lost(
         ``kept_true``, ``lost_true``: discrete extrema with a true partner that are
         accepted or not; ``kept_false, lost_false``: those without; ``moved_wrong``: of the kept
         true ones, those whose refined place has no true partner any more; ``n_true``, recall and
-        precision of the refined ones as `judged` has them, and their ``median_location``.
+        precision of the refined ones as `recall_and_precision` has them, and their
+        ``median_location``.
     """
     options = dict(tolerances or {})
     counted = inside(extrema, "step_sigma")
@@ -110,7 +111,9 @@ def kept_and_lost(
     kept = np.zeros(len(extrema), dtype=bool)
     kept[refined["keypoint"]] = True
     refined = with_positions(refined)
-    judgement = judged(refined, truth, inside(refined, "sigma"), inside(truth, "sigma"), **options)
+    scores = recall_and_precision(
+        refined, truth, inside(refined, "sigma"), inside(truth, "sigma"), **options
+    )
     wrong = refined["keypoint"].to_numpy()[partners(refined, truth, **options) < 0]
     astray = np.zeros(len(extrema), dtype=bool)
     astray[wrong] = True
@@ -121,5 +124,5 @@ def kept_and_lost(
         "kept_false": int((counted & ~right & kept).sum()),
         "lost_false": int((counted & ~right & ~kept).sum()),
         "moved_wrong": int((counted & right & kept & astray).sum()),
-        **{name: judgement[name] for name in names},
+        **{name: scores[name] for name in names},
     }

@@ -134,7 +134,7 @@ class Matched(NamedTuple):
     gap: int
 
 
-def match_samplings(
+def keypoints_of_samplings(
     common: pd.DataFrame, samplings: Sequence[int], same: Same, reverse_order: bool = False
 ) -> Matched:
     """Find the unique keypoints of all samplings, and each in every sampling (section 5.2).
@@ -168,7 +168,7 @@ def long_matches(
     Parameters
     ----------
     matched : Matched
-        From `match_samplings`.
+        From `keypoints_of_samplings`.
     samplings : sequence of int
         Values of n_spo.
     rows : ndarray of int

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.evaluation.intervals import Purpose, normal_half_width, wilson_interval
-from keystab.evaluation.localization import mean_precision
+from keystab.evaluation.localization import mean_localization
 from keystab.evaluation.stability import stability_curve
 from keystab.matching.common_range import CommonRange
 from keystab.matching.unique_keypoints import matches, unique_keypoints
@@ -47,7 +47,7 @@ class MatchedViews(NamedTuple):
         return self.found >= 0
 
 
-def match_views(common: pd.DataFrame, n_views: int, same: Mapping[str, Any]) -> MatchedViews:
+def keypoints_of_views(common: pd.DataFrame, n_views: int, same: Mapping[str, Any]) -> MatchedViews:
     """Find the unique keypoints of a set of views, and each in every view.
 
     Parameters
@@ -85,7 +85,7 @@ def curve_table(matched: MatchedViews, labels: Labels, n_resamples: int) -> pd.D
     return labelled(curve, labels)
 
 
-def precision_table(
+def localization_table(
     matched: MatchedViews, labels: Labels, minimum_share: float, n_resamples: int
 ) -> pd.DataFrame:
     """Mean precision of the keypoints seen often enough (figures 7 c, 8 b).
@@ -94,9 +94,9 @@ def precision_table(
     -------
     DataFrame
         `labels`, ``quantity`` (location in pixels of the first view, log2_sigma in octaves) and the
-        columns of `keystab.evaluation.localization.mean_precision`.
+        columns of `keystab.evaluation.localization.mean_localization`.
     """
-    table = mean_precision(
+    table = mean_localization(
         matched.common, matched.found, minimum_share, n_resamples, purpose_of(labels)
     )
     return labelled(table.reset_index(), labels)
@@ -174,7 +174,7 @@ def scale_table(
     for start in starts:
         field = (everywhere.specs, everywhere.reference_shape, everywhere.margin)
         octave = CommonRange(*field, start, 2 * start)
-        matched = match_views(octave.common(detections), n_views, same)
+        matched = keypoints_of_views(octave.common(detections), n_views, same)
         curve = stability_curve(
             matched.seen,
             [100 * seen_by],

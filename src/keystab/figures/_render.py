@@ -1,7 +1,7 @@
 """What every figure's command does: read tables, draw, write a PDF and a PNG.
 
 The bytes written depend on the tables, the code and the versions of the libraries, not on the
-time, the folder or the reader's matplotlib settings. Each file carries its passport.
+time, the folder or the reader's matplotlib settings. Each file says in its metadata what it was drawn from.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from keystab._version import __version__
 from keystab.errors import InputError
 from keystab.figures import style
 from keystab.utils.files import written_whole
-from keystab.io.figure_metadata import PNG_KEY, Passport, digests_of
+from keystab.io.figure_metadata import PNG_KEY, FigureMetadata, digests_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ _METADATA: dict[str, dict[str, Any]] = {
     "pdf": {"Creator": "keystab", "Producer": None, "CreationDate": None},
     "png": {"Software": None},
 }
-_PASSPORT_KEYS = {"pdf": "Keywords", "png": PNG_KEY}
+_METADATA_KEYS = {"pdf": "Keywords", "png": PNG_KEY}
 
 
 def read_tables(folder: Path | str, needs: Needs) -> dict[str, DataFrame]:
@@ -82,12 +82,12 @@ def check_tables(tables: Tables, needs: Needs) -> None:
 
 
 def save(
-    figure: Figure, path: Path | str, draft: bool = False, passport: Passport | None = None
+    figure: Figure, path: Path | str, draft: bool = False, metadata: FigureMetadata | None = None
 ) -> None:
     """Write a figure as PDF or PNG by the ending of `path`; complete or not at all.
 
     Drafts have their letters as shapes, which is quicker to write than the fonts that journals ask
-    for. A passport goes into the file's metadata.
+    for. What it was drawn from goes into the file's metadata.
 
     Raises
     ------
@@ -98,10 +98,10 @@ def save(
     kind = path.suffix.lstrip(".").lower()
     if kind not in _METADATA:
         raise InputError(f"{path}: a figure is written as .pdf or .png; change the ending")
-    metadata = _METADATA[kind] | ({_PASSPORT_KEYS[kind]: passport.to_text()} if passport else {})
+    fields = _METADATA[kind] | ({_METADATA_KEYS[kind]: metadata.to_text()} if metadata else {})
     try:
         with style.context(draft), written_whole(path) as part:
-            figure.savefig(part, format=kind, metadata=metadata)
+            figure.savefig(part, format=kind, metadata=fields)
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"{path}: cannot be written ({reason}); choose another folder") from None
@@ -131,8 +131,8 @@ def main(
     parser.add_argument("--pdf", type=Path, help="PDF to write")
     parser.add_argument("--png", type=Path, help="PNG to write, at 300 dots per inch")
     parser.add_argument("--draft", action="store_true", help="mark the figure as a draft")
-    parser.add_argument("--code", metavar="SHA256", help="fingerprint of the code, for the passport")
-    parser.add_argument("--lock", metavar="SHA256", help="digest of the lock file, for the passport")
+    parser.add_argument("--code", metavar="SHA256", help="fingerprint of the code, for the metadata")
+    parser.add_argument("--lock", metavar="SHA256", help="digest of the lock file, for the metadata")
     args = parser.parse_args(argv)
     try:
         if args.pdf is None and args.png is None:
@@ -142,8 +142,8 @@ def main(
         figure = draw(tables, args.draft)
         for path in filter(None, (args.pdf, args.png)):
             own = {"draft": str(args.draft)}
-            passport = Passport(path.stem, __version__, args.code, args.lock, own, digests)
-            save(figure, path, args.draft, passport)
+            metadata = FigureMetadata(path.stem, __version__, args.code, args.lock, own, digests)
+            save(figure, path, args.draft, metadata)
             print(f"wrote {path}")
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -111,7 +111,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         number, shipped = style.panels(outer[2], 1, 2, wspace=0.03)[0]
         labels[number] = _draw_counts(number, counts[counts["n_spo"].isin(samplings)])
         heads[shipped] = ("", "seen in all")
-        labels[shipped] = _draw_shipped(shipped, tables["fig7_shipped"], curves)
+        labels[shipped] = _draw_sift(shipped, tables["fig7_shipped"], curves)
         end_labels(labels, heads)
         return style.settle(figure, draft)
 
@@ -180,12 +180,12 @@ def _above(ax: Axes) -> dict[str, Any]:
     return place | {"fontsize": style.SMALL}
 
 
-def _draw_shipped(ax: Axes, shipped: DataFrame, curves: DataFrame) -> list[EndLabel]:
+def _draw_sift(ax: Axes, shipped: DataFrame, curves: DataFrame) -> list[EndLabel]:
     """Draw the curves of SIFT as shipped, and for comparison the usual one of the same sampling."""
     style.letter(ax, "f", "SIFT as shipped")
     curve_axes(ax)
     labels = []
-    for name, colour in palette.SHIPPED_COLOURS.items():
+    for name, colour in palette.SIFT_COLOURS.items():
         rows = shipped[shipped["shipped"] == name]
         if len(rows) == 0:
             raise InputError(f"fig7_shipped.csv: has no rows of {name}; remake the table")

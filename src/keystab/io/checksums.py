@@ -1,4 +1,4 @@
-"""Seals: digests of all files of a folder, to find what was damaged, lost or added."""
+"""Checksums of all files of a folder, to find what was damaged, lost or added."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pathlib import Path
 from keystab.errors import InputError
 from keystab.utils.files import written_whole
 
-__all__ = ["list_of_files", "read_sums", "seal", "verify", "write_seal"]
+__all__ = ["checksums", "list_of_files", "read_sums", "verify", "write_checksums"]
 
 
-def seal(path: str | os.PathLike[str]) -> str:
+def checksums(path: str | os.PathLike[str]) -> str:
     """List the digests of all files of a folder, one line each, in the format of ``sha256sum``.
 
     The same contents give the same text, wherever the folder lies. Hidden files do not count: they
@@ -37,7 +37,7 @@ def seal(path: str | os.PathLike[str]) -> str:
     """
     lines = [f"{digest}  {name}\n" for name, digest in _digests(Path(path)).items()]
     if not lines:
-        raise InputError(f"{path}: no folder with files that could be sealed")
+        raise InputError(f"{path}: no folder with files to take checksums of")
     return "".join(lines)
 
 
@@ -71,14 +71,14 @@ def read_sums(text: str) -> dict[str, str]:
     return {name: digest for digest, _, name in lines if name}
 
 
-def write_seal(path: str | os.PathLike[str], seal_path: str | os.PathLike[str]) -> None:
-    """Write the `seal` of a folder to a file beside it.
+def write_checksums(path: str | os.PathLike[str], checksum_file: str | os.PathLike[str]) -> None:
+    """Write the `checksums` of a folder to a file beside it.
 
     Parameters
     ----------
     path : path
         The folder.
-    seal_path : path
+    checksum_file : path
         The file, by custom the folder's name with ``.sha256`` appended.
 
     Raises
@@ -86,37 +86,39 @@ def write_seal(path: str | os.PathLike[str], seal_path: str | os.PathLike[str]) 
     InputError
         If there is no such folder, or no file in it.
     """
-    text = seal(path)
-    with written_whole(seal_path) as part:
+    text = checksums(path)
+    with written_whole(checksum_file) as part:
         part.write_text(text, encoding="utf-8", newline="")
 
 
-def verify(path: str | os.PathLike[str], seal_path: str | os.PathLike[str]) -> None:
-    """Check a folder against its seal.
+def verify(path: str | os.PathLike[str], checksum_file: str | os.PathLike[str]) -> None:
+    """Check a folder against its checksums.
 
     Parameters
     ----------
     path : path
         The folder.
-    seal_path : path
-        The file that `write_seal` wrote.
+    checksum_file : path
+        The file that `write_checksums` wrote.
 
     Raises
     ------
     InputError
-        If files are damaged, missing or new; the first of them is named. Also if there is no
-        seal.
+        If files are damaged, missing or new; the first of them is named. Also if there are
+        no checksums.
     """
     try:
-        sealed = read_sums(Path(seal_path).read_text(encoding="utf-8"))
+        noted = read_sums(Path(checksum_file).read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        raise InputError(f"{seal_path}: no readable seal; make the store again") from None
+        raise InputError(f"{checksum_file}: no readable checksums; make the store again") from None
     found = _digests(Path(path))
-    problems = [f"{name} is missing" for name in sealed if name not in found]
+    problems = [f"{name} is missing" for name in noted if name not in found]
     problems += [
-        f"{name} is damaged" for name in sealed if name in found and found[name] != sealed[name]
+        f"{name} is damaged" for name in noted if name in found and found[name] != noted[name]
     ]
-    problems += [f"{name} was not there when it was sealed" for name in found if name not in sealed]
+    problems += [
+        f"{name} was not there when checksums were taken" for name in found if name not in noted
+    ]
     if problems:
         more = f", and {len(problems) - 1} more" if len(problems) > 1 else ""
         raise InputError(f"{path}: {problems[0]}{more}; delete the store and make it again")

@@ -25,7 +25,7 @@ __all__ = ["describe"]
 def describe(path: str | os.PathLike[str]) -> str:
     """Say what a stored scale-space, a stored set of views or a table of keypoints holds.
 
-    Where a store has a seal beside it (`keystab.io.checksums`), all its files are checked.
+    Where a store has checksums beside it (`keystab.io.checksums`), all its files are checked.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def describe(path: str | os.PathLike[str]) -> str:
         raise InputError(f"{path}: no such file or folder; give a store or a table")
     if path.is_file():
         return "\n".join(_table(read_table(path), path))
-    seal = _seal(path)
+    checked = _checked(path)
     attributes = attributes_of(path)
     if attributes.get("kind") == "scale-space":
         lines = _scale_space(open_scale_space(path), path)
@@ -55,7 +55,7 @@ def describe(path: str | os.PathLike[str]) -> str:
         lines = _views(open_views(path), path)
     else:
         raise InputError(f"{path}: a Zarr group, but none that keystab wrote")
-    return "\n".join([*lines, *_other(attributes), seal])
+    return "\n".join([*lines, *_other(attributes), checked])
 
 
 def _scale_space(space: xr.Dataset, path: Path) -> list[str]:
@@ -120,10 +120,10 @@ def _other(attributes: Mapping[str, Any]) -> list[str]:
     return [f"  {key}: {value}" for key, value in known.items()]
 
 
-def _seal(path: Path) -> str:
+def _checked(path: Path) -> str:
     folder = path.absolute()  # "." has no name
-    seal = folder.with_name(f"{folder.name}.sha256")
-    if not seal.is_file():
-        return "  no seal beside it; every chunk is there"
-    verify(path, seal)
-    return "  all files agree with the seal beside it"
+    checksums = folder.with_name(f"{folder.name}.sha256")
+    if not checksums.is_file():
+        return "  no checksums beside it; every chunk is there"
+    verify(path, checksums)
+    return "  all files agree with the checksums beside it"

@@ -1,9 +1,9 @@
-"""The passport that a figure carries in its metadata: what it was drawn by and from.
+"""What a figure says of itself in its metadata: what it was drawn by and from.
 
-A passport holds no time and no folder, so that the same tables, code and libraries give the same
+It holds no time and no folder, so that the same tables, code and libraries give the same
 bytes. All settings but a figure's own reach it through its tables, whose digests it holds. A
 setting that changed anything in the figure changed one of them, and a setting that has nothing to
-do with the figure changes neither its passport nor its bytes.
+do with the figure changes not a byte.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from pathlib import Path
 
 from keystab.errors import InputError
 
-__all__ = ["PNG_KEY", "Passport", "digests_of"]
+__all__ = ["PNG_KEY", "FigureMetadata", "digests_of"]
 
 PNG_KEY = "keystab"
-"""Text chunk of a PNG that holds the passport; a PDF has it in ``/Keywords`` of its ``/Info``."""
+"""Text chunk of a PNG that holds them; a PDF has it in ``/Keywords`` of its ``/Info``."""
 
 _DIGEST = re.compile("[0-9a-f]{64}")
 _NAME = re.compile(r"[A-Za-z0-9]\w*", re.ASCII)
@@ -28,7 +28,7 @@ _FILE = re.compile(r"\w[\w.+-]*")
 
 
 @dataclasses.dataclass(frozen=True)
-class Passport:
+class FigureMetadata:
     """What one figure was drawn by and from.
 
     Parameters
@@ -61,7 +61,8 @@ class Passport:
 
         Examples
         --------
-        >>> one = Passport("fig1", "0.1.0", None, None, {"draft": "False"}, {"fig1.csv": 64 * "0"})
+        >>> tables = {"fig1.csv": 64 * "0"}
+        >>> one = FigureMetadata("fig1", "0.1.0", None, None, {"draft": "False"}, tables)
         >>> other = dataclasses.replace(one, tables={"fig1.csv": 64 * "1"})
         >>> one.config == other.config
         False
@@ -74,32 +75,32 @@ class Passport:
         return _canonical({**dataclasses.asdict(self), "config": self.config})
 
     @classmethod
-    def from_text(cls, text: str) -> Passport:
+    def from_text(cls, text: str) -> FigureMetadata:
         """Read what `to_text` wrote.
 
         Raises
         ------
         InputError
-            If the text is no passport, or its digests do not belong together.
+            If the text is none of these, or its digests do not belong together.
         """
         try:
             fields = json.loads(text)
             config = fields.pop("config")
-            passport = cls(**fields)
+            metadata = cls(**fields)
             # Names become paths: a stranger's must not lead elsewhere.
             sound = (
-                isinstance(passport.settings, dict)
-                and _NAME.fullmatch(passport.figure)
-                and isinstance(passport.version, str)
-                and all(map(_FILE.fullmatch, passport.tables))
-                and all(map(_DIGEST.fullmatch, passport.tables.values()))
-                and all(_DIGEST.fullmatch(it) for it in (passport.code, passport.lock) if it)
+                isinstance(metadata.settings, dict)
+                and _NAME.fullmatch(metadata.figure)
+                and isinstance(metadata.version, str)
+                and all(map(_FILE.fullmatch, metadata.tables))
+                and all(map(_DIGEST.fullmatch, metadata.tables.values()))
+                and all(_DIGEST.fullmatch(it) for it in (metadata.code, metadata.lock) if it)
             )
         except (ValueError, TypeError, AttributeError, KeyError, RecursionError):
-            raise InputError("no passport of keystab") from None
-        if not sound or config != passport.config:
-            raise InputError("its passport was changed by hand or damaged")
-        return passport
+            raise InputError("no metadata of keystab") from None
+        if not sound or config != metadata.config:
+            raise InputError("its metadata were changed by hand or damaged")
+        return metadata
 
 
 def digests_of(files: Iterable[Path]) -> dict[str, str]:

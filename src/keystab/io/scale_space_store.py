@@ -1,4 +1,4 @@
-"""Scale-spaces on disk: write and open them (`keystab.io.checksums` seals them).
+"""Scale-spaces on disk: write and open them (`keystab.io.checksums` guards them).
 
 A store is a folder that holds a Zarr (format 3) group named ``data.zarr``, which any Zarr reader
 opens. It appears whole or not at all, every chunk carries a checksum, so that a damaged one raises

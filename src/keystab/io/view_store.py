@@ -223,7 +223,7 @@ class View(NamedTuple):
 
 
 def read_view(store: Path, digest: Path) -> View:
-    """Read the first view of a stored set, after checking the store against its seal."""
+    """Read the first view of a stored set, after checking the store against its checksums."""
     return read_views(store, digest)[0]
 
 
@@ -275,6 +275,6 @@ class Views:
 
 
 def read_views(store: Path, digest: Path) -> Views:
-    """Open all views of a stored set, after checking the store against its seal."""
+    """Open all views of a stored set, after checking the store against its checksums."""
     verify(store, digest)
     return Views(store)

@@ -2,7 +2,7 @@
 
 Snakemake reruns a rule when its command or a parameter changes, but does not see an edit of the
 library behind the command. Every rule therefore carries the fingerprint of its stage as a
-parameter: it changes when the code of the stage or of any room that the stage imports changes,
+parameter: it changes when the code of the stage or of any module that it imports changes,
 and stays the same under edits of comments, docstrings and layout. Of a catalogue, as the palette of
 the figures and the blocks of parameters are, only the entries count that are used. Only the
 standard library is used, because the Snakefile computes all fingerprints at every start.
@@ -128,7 +128,7 @@ def folder_of_loops(project: Path, package_folder: Path = PACKAGE_FOLDER) -> Pat
 
 
 def modules_of_loops(package_folder: Path = PACKAGE_FOLDER) -> list[str]:
-    """Sorted names of the modules with loops that numba compiles, in whatever room they are.
+    """Sorted names of the modules with loops that numba compiles, in whatever subpackage they are.
 
     Examples
     --------

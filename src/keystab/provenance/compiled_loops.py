@@ -30,8 +30,8 @@ def forget_outdated(package_folder: Path = PACKAGE_FOLDER) -> bool:
     Parameters
     ----------
     package_folder : Path
-        Folder whose modules count, in all rooms, with the compiled loops of each room in its
-        ``__pycache__``.
+        Folder whose modules count, those of subpackages too, with their compiled loops in
+        ``__pycache__`` beside them.
 
     Returns
     -------
@@ -62,12 +62,12 @@ def forget_outdated(package_folder: Path = PACKAGE_FOLDER) -> bool:
     return True
 
 
-def _modules(folder: str | os.PathLike[str], room: str) -> Iterator[str]:
+def _modules(folder: str | os.PathLike[str], within: str) -> Iterator[str]:
     """Name, size and time of each module in a folder and in those below it."""
     with os.scandir(folder) as entries:
         for entry in entries:
             if entry.name.endswith(".py"):
                 about = entry.stat()
-                yield f"{room}{entry.name} {about.st_size} {about.st_mtime_ns}\n"
+                yield f"{within}{entry.name} {about.st_size} {about.st_mtime_ns}\n"
             elif entry.name != "__pycache__" and entry.is_dir():
-                yield from _modules(entry.path, f"{room}{entry.name}/")
+                yield from _modules(entry.path, f"{within}{entry.name}/")

@@ -1,4 +1,4 @@
-"""Where a figure comes from: its passport, the files behind it, and how to make it again."""
+"""Where a figure comes from: its metadata, the files behind it, and how to make it again."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 import yaml
 
 from keystab.errors import InputError
-from keystab.io.figure_metadata import PNG_KEY, Passport
+from keystab.io.figure_metadata import PNG_KEY, FigureMetadata
 from keystab.provenance.code_digest import fingerprint
 from keystab.provenance.snakemake_records import Record, read_records, settings_behind, upstream
 
-__all__ = ["code_of_figure", "file_digest", "read_passport", "whence"]
+__all__ = ["code_of_figure", "file_digest", "read_figure_metadata", "whence"]
 
 _SHORT = 12
 _MOST_PIXELS = 100_000_000
@@ -23,21 +23,21 @@ _ESCAPE = re.compile(rb"\\([0-7]{1,3}|.)", re.DOTALL)
 _KEYWORDS = re.compile(rb"/Keywords \(((?:[^()\\]|\\.)*)\)", re.DOTALL)
 
 
-def read_passport(path: Path | str, as_drawn: bool = False) -> Passport:
-    """Read the passport of a figure.
+def read_figure_metadata(path: Path | str, as_drawn: bool = False) -> FigureMetadata:
+    """Read what a figure says of itself.
 
     Parameters
     ----------
     path : path
         A PDF or PNG; what it is, its content says, not its ending.
     as_drawn : bool, optional
-        Read a passport only where the study writes it. Nothing is then decoded, so that a figure
+        Read a metadata only where the study writes it. Nothing is then decoded, so that a figure
         that a stranger made can neither fill the memory nor take long.
 
     Raises
     ------
     InputError
-        If there is no such file, it is no readable PDF or PNG, or it has no sound passport.
+        If there is no such file, it is no readable PDF or PNG, or it has no sound metadata.
     """
     path = Path(path)
     try:
@@ -55,10 +55,10 @@ def read_passport(path: Path | str, as_drawn: bool = False) -> Passport:
         raise InputError(f"{path}: neither a PDF nor a PNG; give a figure of the study")
     if text is None:
         raise InputError(
-            f"{path}: has no passport of keystab; was it drawn by the study, and not changed since?"
+            f"{path}: has no metadata of keystab; was it drawn by the study, and not changed since?"
         )
     try:
-        return Passport.from_text(text)
+        return FigureMetadata.from_text(text)
     except InputError as error:
         raise InputError(f"{path}: {error}; draw it again") from None
 
@@ -124,28 +124,28 @@ def whence(path: Path | str, project: Path) -> str:
     Returns
     -------
     str
-        What its passport says, and whether that is still so here; the files that it was made from,
+        What its metadata say, and whether that is still so here; the files that it was made from,
         down to the picture, with digests; the settings behind it; the commands that make it again.
 
     Raises
     ------
     InputError
-        As `read_passport`.
+        As `read_figure_metadata`.
     """
     path = Path(path)
-    passport = read_passport(path)
+    metadata = read_figure_metadata(path)
     records = read_records(project)
-    drawn = _record_of(path, passport, records, project)
-    lines = [f"{path}: {passport.figure}, drawn by keystab {passport.version}"]
-    lines += [f"  {line}" for line in _identity(passport, project)]
+    drawn = _record_of(path, metadata, records, project)
+    lines = [f"{path}: {metadata.figure}, drawn by keystab {metadata.version}"]
+    lines += [f"  {line}" for line in _identity(metadata, project)]
     lines += ["", "drawn from"]
     folder = Path(drawn.inputs[0]).parent if drawn and drawn.inputs else None
-    for name, digest in sorted(passport.tables.items()):
+    for name, digest in sorted(metadata.tables.items()):
         table = (folder / name).as_posix() if folder else name
         lines.append(f"  {table}  {digest}  {_state(project / table, digest)}")
     if drawn is None:
         lines += ["", "the records of Snakemake here know no such figure, nor what lies behind it"]
-        return "\n".join([*lines, "", "to make it again", f"  make figures/{passport.figure}.pdf"])
+        return "\n".join([*lines, "", "to make it again", f"  make figures/{metadata.figure}.pdf"])
     chain = upstream(records, [drawn.output])
     behind = [record for record in chain if record is not drawn]
     lines += ["", "which were made from, and these in turn from"]
@@ -157,28 +157,28 @@ def whence(path: Path | str, project: Path) -> str:
     return "\n".join([*lines, *(f"  {line}" for line in _commands(drawn.output, project))])
 
 
-def _identity(passport: Passport, project: Path) -> Iterator[str]:
-    """What the passport says about code, software and settings, and whether it is so here."""
-    here = code_of_figure(passport.figure)
+def _identity(metadata: FigureMetadata, project: Path) -> Iterator[str]:
+    """What its metadata say about code, software and settings, and whether it is so here."""
+    here = code_of_figure(metadata.figure)
     lock = file_digest(project / "environment.lock")
-    for name, given, now in (("code", passport.code, here), ("lock", passport.lock, lock)):
+    for name, given, now in (("code", metadata.code, here), ("lock", metadata.lock, lock)):
         if given is None:
             yield f"{name:<8} not said: it was drawn by hand"
         else:
             yield f"{name:<8} {given}  {'as it is here' if given == now else 'not as it is here'}"
-    own = ", ".join(f"{name} = {value}" for name, value in sorted(passport.settings.items()))
-    yield f"config   {passport.config}  of its tables and of {own}"
+    own = ", ".join(f"{name} = {value}" for name, value in sorted(metadata.settings.items()))
+    yield f"config   {metadata.config}  of its tables and of {own}"
 
 
 def _record_of(
-    path: Path, passport: Passport, records: Mapping[str, Record], project: Path
+    path: Path, metadata: FigureMetadata, records: Mapping[str, Record], project: Path
 ) -> Record | None:
     """Record of a figure: by its place in the project, or else by the digests of its tables."""
-    wanted = sorted(passport.tables.values())
+    wanted = sorted(metadata.tables.values())
     here = path.absolute()
     name = here.relative_to(project).as_posix() if here.is_relative_to(project) else ""
     candidates = [records[name]] if name in records else []
-    candidates += [record for record in records.values() if record.rule == passport.figure]
+    candidates += [record for record in records.values() if record.rule == metadata.figure]
     for record in candidates:
         if sorted(record.digests.values()) == wanted:
             return record

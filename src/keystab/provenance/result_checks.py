@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 from keystab.errors import InputError
 from keystab.io.checksums import read_sums
-from keystab.io.figure_metadata import Passport
+from keystab.io.figure_metadata import FigureMetadata
 from keystab.provenance import table_differences
 from keystab.provenance.column_relations import broken_relations
-from keystab.provenance.lineage import code_of_figure, file_digest, read_passport
+from keystab.provenance.lineage import code_of_figure, file_digest, read_figure_metadata
 from keystab.provenance.run_description import LEFT_OUT, About, arithmetic, read_about
 from keystab.provenance.snakemake_records import Record
 
@@ -142,7 +142,7 @@ def check_figures(run: Run, lock: str) -> Check:
     for path in run.figures:
         name = run.name(path)
         try:
-            passport = read_passport(path, as_drawn=True)
+            passport = read_figure_metadata(path, as_drawn=True)
         except InputError as error:
             problems.append(f"{name}{str(error).removeprefix(str(path))}")
             continue
@@ -177,8 +177,8 @@ def check_verdicts(run: Run, claims: Path, exact: bool) -> Check:
     """
     from keystab.io.tables import read_table
     from keystab.study.claims import read_claims, table_names
-    from keystab.study.claims_report import write_ledger
-    from keystab.study.verdicts import judge_all
+    from keystab.study.claims_report import write_report
+    from keystab.study.verdicts import outcomes_of
 
     if not claims.is_file():
         return Check("verdicts", "there are no claims here to judge")
@@ -193,7 +193,7 @@ def check_verdicts(run: Run, claims: Path, exact: bool) -> Check:
         }
         with tempfile.TemporaryDirectory() as scratch:
             again = [Path(scratch) / name for name in _VERDICTS]
-            write_ledger(judge_all(asked, tables), *again)
+            write_report(outcomes_of(asked, tables), *again)
             for path in again:
                 if path.read_bytes() == (folder / path.name).read_bytes():
                     continue
@@ -317,8 +317,8 @@ def _compare_pictures(run: Run, reference: Path, about: About, exact: bool) -> C
     for path in compared:
         expected = reference / "figures" / f"{path.stem}.png"
         try:
-            mine = read_passport(path, as_drawn=True)
-            its = read_passport(expected, as_drawn=True)
+            mine = read_figure_metadata(path, as_drawn=True)
+            its = read_figure_metadata(expected, as_drawn=True)
         except InputError:
             continue  # said by check_figures
         if (mine.code, mine.lock, mine.version) != (its.code, its.lock, its.version):
@@ -341,7 +341,7 @@ def _compare_pictures(run: Run, reference: Path, about: About, exact: bool) -> C
     return Check("pictures", words, problems, notes)
 
 
-def _same_tables(one: Passport, other: Passport) -> bool:
+def _same_tables(one: FigureMetadata, other: FigureMetadata) -> bool:
     return (one.tables, one.settings) == (other.tables, other.settings)
 
 

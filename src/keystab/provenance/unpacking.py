@@ -138,7 +138,7 @@ def committed(reference: Path) -> Unpacked:
 
 
 class _UnfitError(ValueError):
-    """What `keystab.provenance.archive.pack` would not have written, in one line."""
+    """What `keystab.provenance.archive.pack` would not have written; its text says it in a line."""
 
 
 def _check_index(stream: IO[bytes]) -> None:

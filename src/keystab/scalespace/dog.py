@@ -24,7 +24,7 @@ from keystab.scalespace.sampling import OVERSAMPLINGS, Sampling, balanced_delta
 from keystab.scalespace.spline_axis import SplineAxis, spline_source
 from keystab.utils import memory
 
-# A tile of the store; searching for extrema uses flatter blocks (see `detection`).
+# A tile of the store; searching for extrema uses flatter blocks (see `keystab.detection.extrema`).
 TILE = 128
 
 

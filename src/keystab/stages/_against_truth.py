@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from keystab.evaluation.recall_precision import judged, with_positions
+from keystab.evaluation.recall_precision import recall_and_precision, with_positions
 from keystab.parameters import Tolerance
 from keystab.stages._compared import Inside
 
@@ -21,6 +21,6 @@ def evaluation(
     def evaluated(found: pd.DataFrame, scale_column: str) -> dict[str, Any]:
         finite = with_positions(found)
         counted = inside(finite, scale_column)
-        return judged(finite, truth, counted, wanted, **vars(tolerance))
+        return recall_and_precision(finite, truth, counted, wanted, **vars(tolerance))
 
     return evaluated

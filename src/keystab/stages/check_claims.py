@@ -11,15 +11,15 @@ def main(claims: Path, tables: list[Path], *, csv: Path, json: Path, markdown: P
     from keystab.errors import InputError
     from keystab.io.tables import read_table
     from keystab.study.claims import read_claims, table_names
-    from keystab.study.claims_report import write_ledger
-    from keystab.study.verdicts import judge_all, tally
+    from keystab.study.claims_report import write_report
+    from keystab.study.verdicts import outcomes_of, tally
 
     asked, files = read_claims(claims), {path.stem: path for path in tables}
     lacking = [f"{name}.csv" for name in table_names(asked) if name not in files]
     if lacking:
         raise InputError(f"{claims} asks for {', '.join(lacking)}: name them with --tables")
-    found = judge_all(asked, {name: read_table(files[name]) for name in table_names(asked)})
-    write_ledger(found, csv, json, markdown)
+    found = outcomes_of(asked, {name: read_table(files[name]) for name in table_names(asked)})
+    write_report(found, csv, json, markdown)
     for verdict, number in tally(found).items():
         print(f"{number:3d} {verdict}")
 

@@ -9,11 +9,11 @@ from keystab.stages._command import command
 def main(verdicts: list[Path], names: list[str], *, csv: Path, markdown: Path) -> None:
     """Read the verdicts; write one row per claim as CSV and Markdown; print what depends."""
     from keystab.io.tables import write_table
-    from keystab.study.claims_by_scene import read_ledger, side_by_side, to_markdown
+    from keystab.study.claims_by_scene import read_report, side_by_side, to_markdown
     from keystab.utils.files import written_whole
 
     table = side_by_side(
-        {name: read_ledger(path) for name, path in zip(names, verdicts, strict=True)}
+        {name: read_report(path) for name, path in zip(names, verdicts, strict=True)}
     )
     write_table(table, csv)
     with written_whole(markdown) as part:

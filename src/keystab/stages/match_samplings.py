@@ -33,8 +33,8 @@ def main(
     extrema, how = read_extrema(samplings), vars(same)
     shape = read_view(*views).shape
     common = extrema[inside(compared, scales.sigma_min, shape)(extrema, "step_sigma")]
-    matched = tables.match_samplings(common, n_spo, how)
-    reverse = tables.match_samplings(common, n_spo, how, reverse_order=True)
+    matched = tables.keypoints_of_samplings(common, n_spo, how)
+    reverse = tables.keypoints_of_samplings(common, n_spo, how, reverse_order=True)
     pairs = tables.long_matches(matched, n_spo, common["row_in_file"].to_numpy())
     seen = pairs.assign(detected=(pairs["row"] >= 0).astype(int))
     steps = {n: balanced_delta(n, scales.kappa, scales.sigma_min) for n in n_spo}

@@ -22,7 +22,7 @@ def main(
     """Read extrema and traces of a set; write curves and counts, filtered and not."""
     from keystab.detection.refinement import refined_keypoints
     from keystab.detection.sift_filters import passes_filters
-    from keystab.experiments.view_stability import count_table, curve_table, match_views
+    from keystab.experiments.view_stability import count_table, curve_table, keypoints_of_views
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_views
     from keystab.stages._compared import common_range
@@ -36,7 +36,7 @@ def main(
     filtered = refined[passes_filters(refined, sift.contrast, sift.edge_ratio)]
     curve_tables, count_tables = [], []
     for name, keypoints in (("unfiltered", refined), ("filtered", filtered)):
-        matched = match_views(everywhere.common(keypoints), len(seen), vars(same))
+        matched = keypoints_of_views(everywhere.common(keypoints), len(seen), vars(same))
         curve_tables.append(curve_table(matched, {"shipped": name}, n_resamples))
         count_tables.append(count_table(matched, {"shipped": name}))
     write_joined(curve_tables, curves)

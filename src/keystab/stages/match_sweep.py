@@ -29,7 +29,7 @@ def main(
     from keystab.experiments.view_stability import (
         count_table,
         curve_table,
-        match_views,
+        keypoints_of_views,
         scale_table,
     )
     from keystab.io.tables import read_table
@@ -46,7 +46,7 @@ def main(
         keypoints = refined_keypoints(
             read_table(extrema_path), read_table(traces_path), **vars(accepted)
         )
-        matched = match_views(everywhere.common(keypoints), len(seen), vars(same))
+        matched = keypoints_of_views(everywhere.common(keypoints), len(seen), vars(same))
         curve_tables.append(curve_table(matched, labels, n_resamples))
         count_tables.append(count_table(matched, labels))
         if octaves:

@@ -22,7 +22,11 @@ def main(
     summary: Path,
 ) -> None:
     """Read the extrema of every variant; write rates against n_spo, and a summary."""
-    from keystab.experiments.sampling_stability import change_counts, floor_summary, match_samplings
+    from keystab.experiments.sampling_stability import (
+        change_counts,
+        floor_summary,
+        keypoints_of_samplings,
+    )
     from keystab.experiments.view_stability import labelled
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_view
@@ -38,7 +42,7 @@ def main(
         shape = read_view(*store).shape
         common = found[inside(compared, scales.sigma_min, shape)(found, "step_sigma")]
         counts = change_counts(found, common, steps, vars(same))
-        stability = match_samplings(common, n_spo, vars(same)).keypoints["stability"]
+        stability = keypoints_of_samplings(common, n_spo, vars(same)).keypoints["stability"]
         rate_tables.append(labelled(counts, {"variant": name}))
         means = floor_summary(counts, stability, settles_at)
         summaries.append(labelled(means, {"variant": name}))

@@ -31,8 +31,8 @@ def main(
     from keystab.experiments.view_stability import (
         count_table,
         curve_table,
-        match_views,
-        precision_table,
+        keypoints_of_views,
+        localization_table,
     )
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_views
@@ -50,13 +50,13 @@ def main(
         for choice in choices(discrete, models, limits):
             labels = {"n_spo": n, **choice.labels}
             common = everywhere.common(choice.keypoints, choice.scale_column)
-            matched = match_views(common, len(seen), vars(same))
+            matched = keypoints_of_views(common, len(seen), vars(same))
             count_tables.append(count_table(matched, labels))
             if n in curve_n_spo:
                 curve_tables.append(curve_table(matched, labels, n_resamples))
             if choice.limits in (None, usual):
                 precision_tables.append(
-                    precision_table(matched, labels, minimum_share, n_resamples)
+                    localization_table(matched, labels, minimum_share, n_resamples)
                 )
     write_joined(curve_tables, curves)
     write_joined(precision_tables, precision)

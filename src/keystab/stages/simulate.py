@@ -21,7 +21,7 @@ def main(
     from keystab.camera.simulation import Scene, simulate
     from keystab.camera.view_sets import view_specs
     from keystab.errors import InputError
-    from keystab.io.checksums import write_seal
+    from keystab.io.checksums import write_checksums
     from keystab.io.pictures import read_with_digest
     from keystab.io.view_store import write_views
 
@@ -41,7 +41,7 @@ def main(
     }
     images = (simulate(scene, spec) for spec in specs)
     write_views(images, specs, views.path, attributes, dtype)
-    write_seal(*views)
+    write_checksums(*views)
     print(f"{len(specs)} view(s), the first of {specs[0].shape[0]} x {specs[0].shape[1]} px")
 
 

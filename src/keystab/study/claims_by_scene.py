@@ -1,7 +1,7 @@
-"""Ledgers of claims from several pictures side by side: which verdicts depend on the picture.
+"""Verdicts on claims from several pictures side by side: which of them depend on the picture.
 
-Each picture has a study of its own, laid out by an overlay of the settings, and a ledger in its
-folder of results. `side_by_side` puts the ledgers into one table; criteria must be the same in all.
+Each picture has a study of its own, laid out by an overlay of the settings, and verdicts in its
+folder of results. `side_by_side` puts them into one table; criteria must be the same in all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from keystab.study.verdicts import UNTESTED, VERDICTS
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Source", "finished", "missing", "read_ledger", "side_by_side", "sources", "to_markdown"]
+__all__ = ["Source", "finished", "missing", "read_report", "side_by_side", "sources", "to_markdown"]
 
 #: What the table says of each picture, after the picture's name and an underscore.
 OF_PICTURE = ("verdict", "value", "interval")
@@ -29,25 +29,25 @@ OF_CLAIM = ("id", "where", "statement", "paper", "criterion", "depends")
 
 
 class Source(NamedTuple):
-    """Where the ledger of a picture comes from.
+    """Where the verdicts of a picture come from.
 
     Parameters
     ----------
     name : str
         Name of the picture: that of its file, without suffix and with _ for what is no letter.
-    ledger : str
-        Path of the ledger.
+    report : str
+        Path of the table of verdicts.
     overlay : str
         File of settings that a run needs to make it.
     """
 
     name: str
-    ledger: str
+    report: str
     overlay: str
 
 
 def sources(base: Path | str, overlays: Sequence[Path | str]) -> list[Source]:
-    """Ledgers that studies of several pictures make.
+    """Verdicts that studies of several pictures give.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def sources(base: Path | str, overlays: Sequence[Path | str]) -> list[Source]:
         name = re.sub(r"\W+", "_", Path(given["reference"]).stem)
         source = Source(name, f"{given['results']}/claims.csv", str(overlay))
         for other in found:
-            for what in ("name", "ledger"):
+            for what in ("name", "report"):
                 if getattr(source, what) == getattr(other, what):
                     raise InputError(
                         f"{other.overlay} and {source.overlay} have the same {what}, "
@@ -78,32 +78,32 @@ def sources(base: Path | str, overlays: Sequence[Path | str]) -> list[Source]:
 
 
 def missing(found: Sequence[Source], made: str) -> list[str]:
-    """One line for every ledger that does not exist and is not made now, with what makes it.
+    """One line for every report that does not exist and is not made now, with what makes it.
 
     Parameters
     ----------
     found : sequence of Source
-        Ledgers that are wanted.
+        Reports that are wanted.
     made : str
         Path of the one that is made in this run.
     """
     return [
-        f"{source.ledger} is missing; make it first: "
-        f"make {Path(source.ledger).with_suffix('.md')} WITH={source.overlay}"
+        f"{source.report} is missing; make it first: "
+        f"make {Path(source.report).with_suffix('.md')} WITH={source.overlay}"
         for source in found
-        if source.ledger != made and not Path(source.ledger).is_file()
+        if source.report != made and not Path(source.report).is_file()
     ]
 
 
 def finished(base: Path | str, overlays: Sequence[Path | str], made: str) -> list[Source]:
-    """Ledgers of studies of several pictures, all of them there or made in this run.
+    """Reports of studies of several pictures, all of them there or made in this run.
 
     Each picture has settings of its own, and so a run of its own.
 
     Raises
     ------
     InputError
-        As `sources`, and if a ledger is `missing`.
+        As `sources`, and if a report is `missing`.
     """
     found = sources(base, overlays)
     problems = missing(found, made)
@@ -112,8 +112,8 @@ def finished(base: Path | str, overlays: Sequence[Path | str], made: str) -> lis
     return found
 
 
-def read_ledger(path: Path | str) -> pd.DataFrame:
-    """Read a table of `keystab.study.claims_report.write_ledger`; empty texts are ''.
+def read_report(path: Path | str) -> pd.DataFrame:
+    """Read a table of `keystab.study.claims_report.write_report`; empty texts are ''.
 
     Raises
     ------
@@ -125,13 +125,13 @@ def read_ledger(path: Path | str) -> pd.DataFrame:
     return read_table(path, FIELDS).astype(object).fillna("").astype(str)
 
 
-def side_by_side(ledgers: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def side_by_side(reports: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """One row per claim, with its verdict and numbers for every picture.
 
     Parameters
     ----------
-    ledgers : mapping
-        Ledger of each picture, see `keystab.study.claims_report.to_table`, in the order of the
+    reports : mapping
+        Report of each picture, see `keystab.study.claims_report.to_table`, in the order of the
         columns.
 
     Returns
@@ -139,7 +139,7 @@ def side_by_side(ledgers: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     DataFrame
         ``id, where, statement, paper, criterion``; ``depends``, yes where verdicts differ and
         else no; and ``NAME_verdict, NAME_value, NAME_interval`` for every picture NAME. Claims
-        are in the order of the first ledger.
+        are in the order of the first report.
 
     Raises
     ------
@@ -156,19 +156,19 @@ def side_by_side(ledgers: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     [['few', 'yes', 'reproduced', 'not reproduced']]
     >>> side_by_side({"hill": one, "lake": one[:0]})
     Traceback (most recent call last):
-    keystab.errors.InputError: lake: its ledger lacks few; make all from one config/claims.yaml
+    keystab.errors.InputError: lake: its report lacks few; make all from one config/claims.yaml
     """
     import pandas as pd
 
-    if len(ledgers) < 2:
-        raise InputError("ledgers of two pictures or more are needed to compare")
-    every = list(dict.fromkeys(name for ledger in ledgers.values() for name in ledger["id"]))
+    if len(reports) < 2:
+        raise InputError("reports of two pictures or more are needed to compare")
+    every = list(dict.fromkeys(name for report in reports.values() for name in report["id"]))
     together = "make all from one config/claims.yaml"
-    for picture, ledger in ledgers.items():
-        lacking = [name for name in every if name not in set(ledger["id"])]
+    for picture, report in reports.items():
+        lacking = [name for name in every if name not in set(report["id"])]
         if lacking:
-            raise InputError(f"{picture}: its ledger lacks {', '.join(lacking)}; {together}")
-    ordered = {name: ledger.set_index("id").loc[every] for name, ledger in ledgers.items()}
+            raise InputError(f"{picture}: its report lacks {', '.join(lacking)}; {together}")
+    ordered = {name: report.set_index("id").loc[every] for name, report in reports.items()}
     first, *others = ordered
     for other in others:
         differ = ordered[first]["criterion"] != ordered[other]["criterion"]
@@ -177,12 +177,12 @@ def side_by_side(ledgers: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
                 f"{first} and {other} were asked different criteria for "
                 f"{', '.join(differ[differ].index)}; {together}"
             )
-    verdicts = pd.DataFrame({name: ledger["verdict"] for name, ledger in ordered.items()})
+    verdicts = pd.DataFrame({name: report["verdict"] for name, report in ordered.items()})
     table = ordered[first].reset_index()
     table["depends"] = ["yes" if n > 1 else "no" for n in verdicts.nunique(axis=1)]
     of_pictures = {
-        f"{name}_{what}": ledger[what].to_numpy()
-        for name, ledger in ordered.items()
+        f"{name}_{what}": report[what].to_numpy()
+        for name, report in ordered.items()
         for what in OF_PICTURE
     }
     return pd.concat([table[list(OF_CLAIM)], pd.DataFrame(of_pictures)], axis=1)

@@ -8,22 +8,22 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from keystab.study.verdicts import UNTESTED, VERDICTS, Judgement, tally
+from keystab.study.verdicts import UNTESTED, VERDICTS, Outcome, tally
 from keystab.utils.files import written_whole
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["FIELDS", "cell", "records", "to_json", "to_markdown", "to_table", "write_ledger"]
+__all__ = ["FIELDS", "cell", "records", "to_json", "to_markdown", "to_table", "write_report"]
 
-#: What the ledger says of every claim, in this order.
+#: What is said of every claim, in this order.
 FIELDS = (
     *("id", "where", "statement", "figure", "table", "criterion"),
     *("value", "interval", "paper", "verdict", "note"),
 )
 
 
-def records(judgements: Iterable[Judgement]) -> list[dict[str, Any]]:
+def records(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
     """One record per claim with `FIELDS`; numbers that do not exist are None, infinity is "inf".
 
     ``value`` maps names to numbers, ``interval`` names to pairs of ends, where there are any.
@@ -46,7 +46,7 @@ def records(judgements: Iterable[Judgement]) -> list[dict[str, Any]]:
             "verdict": each.verdict,
             "note": each.note,
         }
-        for each in judgements
+        for each in outcomes
     ]
 
 
@@ -57,13 +57,13 @@ def _plain(value: float) -> float | str | None:
     return value if math.isfinite(value) else str(value)
 
 
-def to_json(judgements: Iterable[Judgement]) -> str:
-    """Write the ledger as JSON: a list of objects, see `records`."""
-    return json.dumps(records(judgements), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+def to_json(outcomes: Iterable[Outcome]) -> str:
+    """Write the verdicts as JSON: a list of objects, see `records`."""
+    return json.dumps(records(outcomes), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def to_table(judgements: Iterable[Judgement]) -> pd.DataFrame:
-    """Lay out the ledger as a table of texts, one row per claim."""
+def to_table(outcomes: Iterable[Outcome]) -> pd.DataFrame:
+    """Lay out the verdicts as a table of texts, one row per claim."""
     import pandas as pd
 
     rows = [
@@ -76,7 +76,7 @@ def to_table(judgements: Iterable[Judgement]) -> pd.DataFrame:
                 for name, (low, high) in record["interval"].items()
             ),
         }
-        for record in records(judgements)
+        for record in records(outcomes)
     ]
     return pd.DataFrame(rows, columns=list(FIELDS))
 
@@ -100,10 +100,10 @@ def _short(value: float | str | None) -> str:
     return f"{value:.0f}" if value == round(value) else f"{value:.4g}"
 
 
-def to_markdown(judgements: Sequence[Judgement]) -> str:
-    """Write the ledger for people: how many verdicts of each kind, then the claims by verdict."""
-    table = to_table(judgements)
-    counts = tally(judgements)
+def to_markdown(outcomes: Sequence[Outcome]) -> str:
+    """Write the verdicts for people: how many verdicts of each kind, then the claims by verdict."""
+    table = to_table(outcomes)
+    counts = tally(outcomes)
     lines = [
         "# What the paper says, and what this run says of it",
         "",
@@ -113,7 +113,7 @@ def to_markdown(judgements: Sequence[Judgement]) -> str:
         "| verdict | claims |",
         "|---|---|",
         *(f"| {verdict} | {number} |" for verdict, number in counts.items()),
-        f"| all | {len(judgements)} |",
+        f"| all | {len(outcomes)} |",
     ]
     for verdict in VERDICTS:
         if not counts[verdict]:
@@ -145,16 +145,16 @@ def cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
-def write_ledger(
-    judgements: Sequence[Judgement],
+def write_report(
+    outcomes: Sequence[Outcome],
     csv: str | os.PathLike[str],
     json_file: str | os.PathLike[str],
     markdown: str | os.PathLike[str],
 ) -> None:
-    """Write the ledger as a table, as JSON and for people; each file whole or not at all."""
+    """Write the verdicts as a table, as JSON and for people; each file whole or not at all."""
     from keystab.io.tables import write_table
 
-    write_table(to_table(judgements), csv)
-    for path, text in ((json_file, to_json(judgements)), (markdown, to_markdown(judgements))):
+    write_table(to_table(outcomes), csv)
+    for path, text in ((json_file, to_json(outcomes)), (markdown, to_markdown(outcomes))):
         with written_whole(path) as part:
             part.write_text(text, encoding="utf-8", newline="")

@@ -16,7 +16,7 @@ from keystab.study.expressions import evaluate, names_of
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Judgement", "VERDICTS", "judge", "judge_all", "measured", "tally"]
+__all__ = ["Outcome", "VERDICTS", "outcome_of", "outcomes_of", "measured", "tally"]
 
 REPRODUCED, CONDITION, FAILED, UNTESTED = (
     "reproduced",
@@ -38,7 +38,7 @@ class Measured(NamedTuple):
     missing: str = ""
 
 
-class Judgement(NamedTuple):
+class Outcome(NamedTuple):
     """A claim, its numbers, and the verdict."""
 
     claim: Claim
@@ -125,7 +125,7 @@ def measured(quantity: Quantity, tables: Mapping[str, pd.DataFrame]) -> Measured
     return Measured(float(numbers[row]), low, high)
 
 
-def judge(claim: Claim, tables: Mapping[str, pd.DataFrame]) -> Judgement:
+def outcome_of(claim: Claim, tables: Mapping[str, pd.DataFrame]) -> Outcome:
     """Compute the numbers of a claim and give the verdict.
 
     A criterion over a number that does not exist, because settings left out its rows, makes the
@@ -141,13 +141,13 @@ def judge(claim: Claim, tables: Mapping[str, pd.DataFrame]) -> Judgement:
     >>> import pandas as pd
     >>> taken = Quantity("rate", tables=("t",), column="rate", take="mean")
     >>> claim = Claim("ten", "section 1", "Ten.", "", "10 %", (taken,), "0.08 <= rate <= 0.12")
-    >>> judge(claim, {"t": pd.DataFrame({"rate": [0.09, 0.11]})}).verdict
+    >>> outcome_of(claim, {"t": pd.DataFrame({"rate": [0.09, 0.11]})}).verdict
     'reproduced'
-    >>> judge(claim, {"t": pd.DataFrame({"rate": [0.02]})}).verdict
+    >>> outcome_of(claim, {"t": pd.DataFrame({"rate": [0.02]})}).verdict
     'not reproduced'
     """
     if not claim.criterion:
-        return Judgement(claim, {}, UNTESTED, claim.note)
+        return Outcome(claim, {}, UNTESTED, claim.note)
     found: dict[str, Measured] = {}
     try:
         for part in claim.quantities:
@@ -157,7 +157,7 @@ def judge(claim: Claim, tables: Mapping[str, pd.DataFrame]) -> Judgement:
         verdict, reason = _verdict(claim, found)
     except InputError as error:
         raise InputError(f"claim {claim.id}: {error}") from None
-    return Judgement(claim, found, verdict, " ".join(filter(None, (reason, claim.note))))
+    return Outcome(claim, found, verdict, " ".join(filter(None, (reason, claim.note))))
 
 
 def _computed(expression: str, found: Mapping[str, Measured]) -> Measured:
@@ -197,18 +197,18 @@ def _verdict(claim: Claim, found: Mapping[str, Measured]) -> tuple[str, str]:
     return FAILED, ""
 
 
-def judge_all(claims: Iterable[Claim], tables: Mapping[str, pd.DataFrame]) -> list[Judgement]:
+def outcomes_of(claims: Iterable[Claim], tables: Mapping[str, pd.DataFrame]) -> list[Outcome]:
     """Judge claims, in their order."""
-    return [judge(claim, tables) for claim in claims]
+    return [outcome_of(claim, tables) for claim in claims]
 
 
-def tally(judgements: Iterable[Judgement]) -> dict[str, int]:
+def tally(outcomes: Iterable[Outcome]) -> dict[str, int]:
     """Count verdicts.
 
     Examples
     --------
-    >>> tally([Judgement(Claim("a", "", "", "", ""), {}, "not testable", "")])["not testable"]
+    >>> tally([Outcome(Claim("a", "", "", "", ""), {}, "not testable", "")])["not testable"]
     1
     """
-    verdicts = [each.verdict for each in judgements]
+    verdicts = [each.verdict for each in outcomes]
     return {verdict: verdicts.count(verdict) for verdict in VERDICTS}

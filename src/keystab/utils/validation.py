@@ -45,12 +45,12 @@ def limit(name: str, value: Any, least: float | None = None, above: float | None
     return number(name, value, least, above)
 
 
-def truth(name: str, value: Any) -> bool:
+def boolean(name: str, value: Any) -> bool:
     """Return True or False, or refuse what is neither.
 
     Examples
     --------
-    >>> truth("refine", True)
+    >>> boolean("refine", True)
     True
     """
     if not isinstance(value, (bool, np.bool_)):

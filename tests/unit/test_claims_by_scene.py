@@ -26,8 +26,8 @@ CLAIMS = [
 def ledger(folder, rate: float, entries=CLAIMS):
     """Write the ledger of a picture in which a rate was found; its path."""
     table = pd.DataFrame({"rate": [rate], "low": [rate - 0.05], "high": [rate + 0.05], "n": [7]})
-    judged = verdicts.judge_all(claims.parse_claims(entries), {"rates": table})
-    claims_report.write_ledger(
+    judged = verdicts.outcomes_of(claims.parse_claims(entries), {"rates": table})
+    claims_report.write_report(
         judged, *(folder / f"claims.{kind}" for kind in ("csv", "json", "md"))
     )
     return folder / "claims.csv"
@@ -87,8 +87,8 @@ def test_claims_are_brought_together_by_their_names(three, tmp_path):
 @pytest.mark.parametrize(
     ("picture", "entries", "says"),
     [
-        ("town", CLAIMS[1:], "town: its ledger lacks rare; make all from one config/claims.yaml"),
-        ("hill", CLAIMS[:1], "hill: its ledger lacks found, cited;"),
+        ("town", CLAIMS[1:], "town: its report lacks rare; make all from one config/claims.yaml"),
+        ("hill", CLAIMS[:1], "hill: its report lacks found, cited;"),
         ("lake", [CLAIMS[0] | {"criterion": "rate < 0.4"}, *CLAIMS[1:]], "hill and lake were asked different criteria for rare;"),
     ],
 )  # fmt: skip
@@ -138,7 +138,7 @@ def test_pictures_are_named_by_their_files_and_found_in_their_results(tmp_path, 
 @pytest.mark.parametrize(
     ("lake", "says"),
     [
-        ({"reference": "lake.png"}, "have the same ledger, results/claims.csv"),
+        ({"reference": "lake.png"}, "have the same report, results/claims.csv"),
         ({"results": "results/lake"}, "have the same name, hill"),
     ],
 )

@@ -12,7 +12,12 @@ from scenes import blobs
 from keystab.detection.detector import detect_keypoints, extrema_table
 from keystab.detection.extrema import discrete_extrema
 from keystab.detection.refinement import MOST_MODELS, trace
-from keystab.evaluation.recall_precision import causes, judged, mean_over_views, partners
+from keystab.evaluation.recall_precision import (
+    causes,
+    mean_over_views,
+    partners,
+    recall_and_precision,
+)
 from keystab.experiments.refinement_choices import kept_and_lost
 from keystab.scalespace.dog import scale_space
 from keystab.truth.true_extrema import true_extrema
@@ -54,7 +59,7 @@ def test_partners_are_one_to_one_near_and_of_one_sign(seed, n, m):
 @given(st.integers(0, 10**6), st.integers(1, 40))
 def test_the_truth_itself_is_right_and_complete(seed, n):
     truth = points(seed, n)
-    result = judged(truth, truth, everything(truth), everything(truth))
+    result = recall_and_precision(truth, truth, everything(truth), everything(truth))
     assert result["recall"] == result["precision"] == 1.0
     assert result["n_true"] == result["n_found"] == result["n_right"] == n
     assert result["median_location"] == result["p90_scale"] == 0.0 and result["n_twin"] == 0
@@ -63,15 +68,20 @@ def test_the_truth_itself_is_right_and_complete(seed, n):
 def test_errors_are_those_that_were_made():
     truth = pd.DataFrame({"y": [5.0, 20.0], "x": [5.0, 20.0], "sigma": [1.5, 1.8], "sign": [1, -1]})
     found = truth.assign(y=truth["y"] + 0.3, x=truth["x"] - 0.4, sigma=truth["sigma"] * 2**0.25)
-    result = judged(found, truth, everything(found), everything(truth))
+    result = recall_and_precision(found, truth, everything(found), everything(truth))
     assert result["median_location"] == pytest.approx(0.5)
     assert result["median_scale"] == pytest.approx(0.25)
-    assert judged(found.assign(sign=0), truth, everything(found), everything(truth))["recall"] == 0
+    assert (
+        recall_and_precision(found.assign(sign=0), truth, everything(found), everything(truth))[
+            "recall"
+        ]
+        == 0
+    )
 
 
 def test_nothing_at_all_is_neither_right_nor_wrong():
     none, some = points(0, 0), points(0, 3)
-    result = judged(none, some, everything(none), everything(some))
+    result = recall_and_precision(none, some, everything(none), everything(some))
     assert result["recall"] == 0.0 and np.isnan(result["precision"])
     assert np.isnan(result["median_location"])
 
@@ -79,7 +89,7 @@ def test_nothing_at_all_is_neither_right_nor_wrong():
 def test_what_lies_beyond_the_range_serves_as_partner_but_is_not_counted():
     truth = pd.DataFrame({"y": [5.0], "x": [5.0], "sigma": [2.3], "sign": [1]})
     found = truth.assign(sigma=2.1)
-    result = judged(found, truth, everything(found), np.array([False]))
+    result = recall_and_precision(found, truth, everything(found), np.array([False]))
     assert result["precision"] == 1.0 and result["n_true"] == 0 and np.isnan(result["recall"])
 
 
@@ -97,7 +107,7 @@ def test_a_fine_sampling_finds_the_true_extrema_of_blobs(seed):
 
     sure = inside(truth) & (truth["conditioning"] > 0.1).to_numpy()
     assume(sure.sum() > 2)  # a picture with little in its middle proves little
-    result = judged(found, truth, inside(found), sure)
+    result = recall_and_precision(found, truth, inside(found), sure)
     assert result["recall"] == 1.0 and result["n_true"] > 2
     assert result["median_location"] < 0.01
 

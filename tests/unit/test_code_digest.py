@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from keystab.provenance import code_digest as room
+from keystab.provenance import code_digest
 
 FILES = {
     "__init__.py": '"""Names."""\n__version__ = "1"\n',
@@ -43,12 +43,12 @@ def toy(tmp_path: Path) -> Path:
 
 
 def taken(folder: Path, module: str = "toy.stages.work") -> str:
-    room._read.cache_clear()
-    return room.fingerprint(module, folder)
+    code_digest._read.cache_clear()
+    return code_digest.fingerprint(module, folder)
 
 
 def test_closure_follows_nested_and_relative_imports(toy):
-    modules = room.imported_modules("toy.stages.near", toy)
+    modules = code_digest.imported_modules("toy.stages.near", toy)
     assert modules == ["toy.base", "toy.late", "toy.stages", "toy.stages.near", "toy.stages.work"]
 
 
@@ -149,7 +149,7 @@ def test_a_colour_counts_for_the_figures_that_use_it(painted, old, new, changed)
     before = {name: taken(painted, f"toy.figures.{name}") for name in ("ink", "shades")}
     assert old in PALETTE
     (painted / "figures/palette.py").write_text(PALETTE.replace(old, new))
-    room._read_catalogue.cache_clear()
+    code_digest._read_catalogue.cache_clear()
     after = {name: taken(painted, f"toy.figures.{name}") for name in before}
     assert {name for name in before if before[name] != after[name]} == changed
 
@@ -184,7 +184,7 @@ def test_a_block_of_parameters_counts_for_the_stages_that_use_it(toy, old, new, 
     taken_before = {}
     for text, found in ((BLOCKS, taken_before), (BLOCKS.replace(old, new), after := {})):
         (toy / "parameters.py").write_text(text)
-        room._read_catalogue.cache_clear()
+        code_digest._read_catalogue.cache_clear()
         found.update({name: taken(toy, f"toy.stages.{name}") for name in ("detect", "match")})
     assert old in BLOCKS
     assert {name for name in after if after[name] != taken_before[name]} == changed
@@ -204,7 +204,7 @@ def test_a_block_of_parameters_counts_for_the_stages_that_use_it(toy, old, new, 
 )
 def test_uses_of_a_catalogue_that_cannot_be_followed_are_refused(painted, name, text, said):
     (painted / "figures" / name).write_text(text)
-    room._read_catalogue.cache_clear()
+    code_digest._read_catalogue.cache_clear()
     with pytest.raises(ValueError, match=said):
         taken(painted, "toy.figures.ink")
 
@@ -217,21 +217,23 @@ def test_compiled_loops_are_kept_apart_for_other_code(toy, folder, edited):
         (toy / part / "__init__.py").touch()
     loops = toy / folder / "loops.py"
     loops.write_text("\nfrom numba import njit\nfrom toy.base import double\n")
-    room._read.cache_clear()
-    before = room.folder_of_loops(toy, toy)
+    code_digest._read.cache_clear()
+    before = code_digest.folder_of_loops(toy, toy)
     if edited == "the loop":
         loops.write_text(loops.read_text() + "TWO = double(1)\n")
     else:
         (toy / "base.py").write_text(FILES["base.py"].replace("2 * x", "3 * x"))
-    room._read.cache_clear()
-    assert room.folder_of_loops(toy, toy) != before
+    code_digest._read.cache_clear()
+    assert code_digest.folder_of_loops(toy, toy) != before
 
 
 def test_every_stage_and_figure_of_the_study_can_be_followed():
     for folder in ("stages", "figures"):
-        for path in (room.PACKAGE_FOLDER / folder).glob("*.py"):
+        for path in (code_digest.PACKAGE_FOLDER / folder).glob("*.py"):
             name = f"keystab.{folder}" + ("" if path.stem == "__init__" else f".{path.stem}")
-            assert name in room.imported_modules(name)
-    assert "keystab.detection.extrema" in room.imported_modules("keystab.stages.detect")
-    assert "keystab.detection.extrema" not in room.imported_modules("keystab.stages.simulate")
-    assert "keystab.detection.detector" not in room.imported_modules("keystab.figures.fig1")
+            assert name in code_digest.imported_modules(name)
+    assert "keystab.detection.extrema" in code_digest.imported_modules("keystab.stages.detect")
+    assert "keystab.detection.extrema" not in code_digest.imported_modules(
+        "keystab.stages.simulate"
+    )
+    assert "keystab.detection.detector" not in code_digest.imported_modules("keystab.figures.fig1")

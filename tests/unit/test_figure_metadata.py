@@ -19,13 +19,13 @@ from keystab import __version__
 from keystab.cli import main as cli
 from keystab.errors import InputError
 from keystab.figures._render import main, save
-from keystab.io.figure_metadata import PNG_KEY, Passport, digests_of
+from keystab.io.figure_metadata import PNG_KEY, FigureMetadata, digests_of
 from keystab.io.tables import write_table
-from keystab.provenance.lineage import read_passport
+from keystab.provenance.lineage import read_figure_metadata
 
 DIGEST = st.text("0123456789abcdef", min_size=64, max_size=64)
 SIMPLE = st.text(st.characters(codec="utf-8"), max_size=8)
-PASSPORT = Passport(
+METADATA = FigureMetadata(
     "fig5",
     "0.1.0",
     64 * "a",
@@ -44,35 +44,35 @@ def drawing() -> Figure:
 @pytest.fixture(params=["pdf", "png"])
 def figure(request, tmp_path):
     path = tmp_path / f"fig5.{request.param}"
-    save(drawing(), path, passport=PASSPORT)
+    save(drawing(), path, metadata=METADATA)
     return path
 
 
 @settings(max_examples=30)
 @given(
     st.builds(
-        Passport, st.from_regex("[a-z][a-zA-Z0-9_]*", fullmatch=True), SIMPLE,
+        FigureMetadata, st.from_regex("[a-z][a-zA-Z0-9_]*", fullmatch=True), SIMPLE,
         st.none() | DIGEST, st.none() | DIGEST, st.dictionaries(SIMPLE, SIMPLE, max_size=3),
         st.dictionaries(st.from_regex(r"\w[\w.]*", fullmatch=True), DIGEST, max_size=3),
     )
 )  # fmt: skip
-def test_a_passport_is_read_as_it_was_written(passport):
-    text = passport.to_text()
+def test_metadata_are_read_as_they_were_written(metadata):
+    text = metadata.to_text()
     assert text.isascii() and "\n" not in text
-    assert Passport.from_text(text) == passport
+    assert FigureMetadata.from_text(text) == metadata
 
 
 def test_config_changes_with_tables_and_own_settings_and_nothing_else():
-    config = PASSPORT.config
+    config = METADATA.config
     for changes in ({"code": 64 * "c"}, {"lock": None}, {"version": "2"}, {"figure": "fig6"}):
-        assert dataclasses.replace(PASSPORT, **changes).config == config
-    turned = dict(reversed(PASSPORT.tables.items()))
-    assert dataclasses.replace(PASSPORT, tables=turned).to_text() == PASSPORT.to_text()
+        assert dataclasses.replace(METADATA, **changes).config == config
+    turned = dict(reversed(METADATA.tables.items()))
+    assert dataclasses.replace(METADATA, tables=turned).to_text() == METADATA.to_text()
     for changes in (
         {"settings": {"draft": "True"}},
-        {"tables": PASSPORT.tables | {"one.csv": 64 * "3"}},
+        {"tables": METADATA.tables | {"one.csv": 64 * "3"}},
     ):
-        assert dataclasses.replace(PASSPORT, **changes).config != config
+        assert dataclasses.replace(METADATA, **changes).config != config
 
 
 @pytest.mark.parametrize(
@@ -86,43 +86,43 @@ def test_config_changes_with_tables_and_own_settings_and_nothing_else():
         ('"fig5"', ""),
     ],
 )
-def test_a_changed_passport_is_refused(old, new):
-    text = PASSPORT.to_text()
+def test_changed_metadata_are_refused(old, new):
+    text = METADATA.to_text()
     assert old in text
-    with pytest.raises(InputError, match="no passport of keystab|changed by hand or damaged"):
-        Passport.from_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match="no metadata of keystab|changed by hand or damaged"):
+        FigureMetadata.from_text(text.replace(old, new, 1))
 
 
 @pytest.mark.parametrize("figure", ["", "../fig5", "fig5/x", "fig5\n", "/etc/x", "fig.5"])
 def test_a_figure_that_could_be_a_path_is_refused(figure):
-    text = dataclasses.replace(PASSPORT, figure=figure).to_text()
+    text = dataclasses.replace(METADATA, figure=figure).to_text()
     with pytest.raises(InputError, match="changed by hand or damaged"):
-        Passport.from_text(text)
+        FigureMetadata.from_text(text)
 
 
 @pytest.mark.parametrize("table", ["../one.csv", "/etc/passwd", "a/b.csv", "", ".hidden"])
 def test_a_table_that_could_be_a_path_is_refused(table):
-    text = dataclasses.replace(PASSPORT, tables={table: 64 * "0"}).to_text()
+    text = dataclasses.replace(METADATA, tables={table: 64 * "0"}).to_text()
     with pytest.raises(InputError, match="changed by hand or damaged"):
-        Passport.from_text(text)
+        FigureMetadata.from_text(text)
 
 
 def test_what_a_figure_carries_is_found_without_decoding_it(figure):
-    assert read_passport(figure, as_drawn=True) == PASSPORT
-    spoilt = dataclasses.replace(PASSPORT, settings={"draft": "a (b) \\ c"})
-    save(drawing(), figure, passport=spoilt)
-    assert read_passport(figure, as_drawn=True) == spoilt
+    assert read_figure_metadata(figure, as_drawn=True) == METADATA
+    spoilt = dataclasses.replace(METADATA, settings={"draft": "a (b) \\ c"})
+    save(drawing(), figure, metadata=spoilt)
+    assert read_figure_metadata(figure, as_drawn=True) == spoilt
 
 
-def test_figures_carry_their_passport_and_no_time(figure):
-    assert read_passport(figure) == PASSPORT
+def test_figures_carry_their_metadata_and_no_time(figure):
+    assert read_figure_metadata(figure) == METADATA
     before = figure.read_bytes()
     assert b"/CreationDate" not in before and b"tIME" not in before and b"/ModDate" not in before
-    save(drawing(), figure, passport=PASSPORT)
+    save(drawing(), figure, metadata=METADATA)
     assert figure.read_bytes() == before
-    other = dataclasses.replace(PASSPORT, tables={"one.csv": 64 * "3"})
-    save(drawing(), figure, passport=other)
-    assert figure.read_bytes() != before and read_passport(figure) == other
+    other = dataclasses.replace(METADATA, tables={"one.csv": 64 * "3"})
+    save(drawing(), figure, metadata=other)
+    assert figure.read_bytes() != before and read_figure_metadata(figure) == other
 
 
 def test_figures_that_other_programs_saved_again_keep_it(figure):
@@ -135,7 +135,7 @@ def test_figures_that_other_programs_saved_again_keep_it(figure):
             info = PngInfo()
             info.add_itxt(PNG_KEY, picture.info[PNG_KEY], zip=True)
             picture.convert("L").save(figure, pnginfo=info)
-    assert read_passport(figure) == PASSPORT
+    assert read_figure_metadata(figure) == METADATA
 
 
 def foreign_pdf() -> bytes:
@@ -156,23 +156,23 @@ def foreign_png() -> bytes:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (foreign_png(), "has no passport"),
-        (foreign_pdf(), "no passport of keystab"),
+        (foreign_png(), "has no metadata"),
+        (foreign_pdf(), "no metadata of keystab"),
         (foreign_png()[:40], "a damaged PNG"),
         (b"%PDF-1.4\n", "a damaged PDF"),
         (foreign_pdf()[:300], "a damaged PDF"),
-        (b"%PDF-1.4\nxref\n0 3\n0000000000 65535 f\ntrailer <</Size 3>>\nstartxref\n9\n%%EOF", "has no passport|a damaged PDF"),
+        (b"%PDF-1.4\nxref\n0 3\n0000000000 65535 f\ntrailer <</Size 3>>\nstartxref\n9\n%%EOF", "has no metadata|a damaged PDF"),
         (b"n_spo,found\n", "neither a PDF nor a PNG"),
         (b"", "neither a PDF nor a PNG"),
     ],
 )  # fmt: skip
-def test_what_has_no_passport_gives_one_line(data, said, tmp_path, monkeypatch, capsys):
+def test_what_has_no_metadata_gives_one_line(data, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for name in ("Snakefile", "environment.lock"):
         (tmp_path / name).touch()
     (tmp_path / "thing.pdf").write_bytes(data)
     with pytest.raises(InputError, match=f"thing.pdf: .*({said})"):
-        read_passport(tmp_path / "thing.pdf")
+        read_figure_metadata(tmp_path / "thing.pdf")
     assert cli.main(["whence", "thing.pdf"]) == 2
     error = capsys.readouterr().err
     assert error.startswith("keystab whence: thing.pdf: ") and error.count("\n") == 1
@@ -184,7 +184,7 @@ def test_missing_figures_folders_and_projects_give_one_line(tmp_path, monkeypatc
     assert "lies in no copy of the project" in capsys.readouterr().err
     for path, said in ((tmp_path / "fig5.pdf", "no such file"), (tmp_path, "is a folder")):
         with pytest.raises(InputError, match=said):
-            read_passport(path)
+            read_figure_metadata(path)
 
 
 def test_the_command_of_a_figure_writes_what_it_was_told_and_what_it_read(tmp_path):
@@ -204,7 +204,7 @@ def test_the_command_of_a_figure_writes_what_it_was_told_and_what_it_read(tmp_pa
         )
         == 0
     )
-    expected = Passport(
+    expected = FigureMetadata(
         "fig0",
         __version__,
         64 * "a",
@@ -212,7 +212,9 @@ def test_the_command_of_a_figure_writes_what_it_was_told_and_what_it_read(tmp_pa
         {"draft": "False"},
         digests_of([tmp_path / "one.csv"]),
     )
-    assert [read_passport(tmp_path / f"fig0.{kind}") for kind in ("pdf", "png")] == 2 * [expected]
+    assert [read_figure_metadata(tmp_path / f"fig0.{kind}") for kind in ("pdf", "png")] == 2 * [
+        expected
+    ]
     assert main(lambda tables, draft: drawing(), needs, [*flags, "--draft"]) == 0
     by_hand = dataclasses.replace(expected, code=None, lock=None, settings={"draft": "True"})
-    assert read_passport(tmp_path / "fig0.pdf") == by_hand
+    assert read_figure_metadata(tmp_path / "fig0.pdf") == by_hand

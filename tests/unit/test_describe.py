@@ -7,7 +7,7 @@ import pytest
 from keystab.camera.views import ViewSpec
 from keystab.errors import InputError
 from keystab.io import scale_space_store, view_store
-from keystab.io.checksums import write_seal
+from keystab.io.checksums import write_checksums
 from keystab.io.describe import describe
 from keystab.io.tables import write_table
 from keystab.scalespace.dog import scale_space
@@ -24,9 +24,9 @@ def test_scale_space(tmp_path):
     assert "24 x 32 samples a slice, one every 0.5 pixels" in text
     assert "24.6 kB" in text
     assert "camera_blur: 0.5" in text and "oversampling: spline" in text
-    assert text.endswith("no seal beside it; every chunk is there")
-    write_seal(tmp_path / "n2", tmp_path / "n2.sha256")
-    assert describe(tmp_path / "n2").endswith("all files agree with the seal beside it")
+    assert text.endswith("no checksums beside it; every chunk is there")
+    write_checksums(tmp_path / "n2", tmp_path / "n2.sha256")
+    assert describe(tmp_path / "n2").endswith("all files agree with the checksums beside it")
     (tmp_path / "n2" / "data.zarr" / "extra").write_text("x")
     with pytest.raises(InputError, match="extra was not there"):
         describe(tmp_path / "n2")
