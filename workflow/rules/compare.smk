@@ -26,7 +26,7 @@ rule match_views:
     benchmark:
         f"{BENCHMARK}match_views/{{figure}}.tsv"
     wildcard_constraints:
-        figure="fig7|fig8|figS1",
+        figure=plan.figures_of_views(swept=False),
     params:
         **stage(
             "match_views",
@@ -123,7 +123,7 @@ rule match_aliasing:
     benchmark:
         f"{BENCHMARK}match_sweep/{{figure}}.tsv"
     wildcard_constraints:
-        figure="fig10",
+        figure=plan.figures_of_views(swept=True),
     params:
         **stage(
             "match_sweep",
@@ -147,7 +147,7 @@ use rule match_aliasing as match_sweep with:
         counts=f"{HERE}tables/{{figure}}_counts.csv",
         scales=f"{HERE}tables/{{figure}}_scales.csv",
     wildcard_constraints:
-        figure="fig11|fig12",
+        figure=plan.figures_of_views(swept=True, against_scale=True),
     params:
         **stage(
             "match_sweep",

@@ -114,6 +114,31 @@ def setting(settings: Settings, place: str) -> Any:
 # Sets of views
 
 
+def figures_of_views(swept: bool, against_scale: bool = False) -> str:
+    """Regular expression for the figures that match the keypoints of sets of views.
+
+    Parameters
+    ----------
+    swept : bool
+        Whether those of a sweep, each set at its one sampling; else of one set at all of its own.
+    against_scale : bool
+        Of sweeps, whether those that draw a table against scale.
+
+    Examples
+    --------
+    >>> figures_of_views(swept=False), figures_of_views(swept=True, against_scale=True)
+    ('fig7|fig8|figS1', 'fig11|fig12')
+    """
+    names = [
+        name
+        for name, about in FIGURES.items()
+        if about.views
+        and bool(about.swept) is swept
+        and (f"{name}_scales.csv" in about.tables) is against_scale
+    ]
+    return "|".join(names)
+
+
 class Searched(NamedTuple):
     """A set of views at one of the samplings at which it is searched."""
 
@@ -157,8 +182,8 @@ def compared_with_scene(settings: Settings) -> list[Searched]:
     """Sets held against the scene as the view ``still`` sees it: first views of the same step."""
     sets = settings["sets"]
     names = ["translations", "rotations"]
-    for figure in ("fig10", "fig11", "fig12"):
-        names += sets_of_figure(settings, figure)
+    for figure, about in FIGURES.items():
+        names += sets_of_figure(settings, figure) if about.swept else []
     step = sets["still"]["step"][0]
     return searches(settings, *(name for name in names if sets[name]["step"][0] == step))
 
