@@ -17,11 +17,13 @@ from pathlib import Path
 
 import yaml
 
+from keystab.study.plan import FIGURES
+
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "REPRODUCING.md"
 BEGIN, END = "<!-- costs: begin -->\n", "<!-- costs: end -->\n"
-OF_THE_PAPER = [f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")]
-OF_OUR_OWN = ["floor", "truth", "refinement", "predictors"]
+OF_THE_PAPER = [name for name in FIGURES if name.startswith("fig")]
+OF_OUR_OWN = [name for name in FIGURES if name not in OF_THE_PAPER]
 TARGETS = {
     **{f"Figure {name.removeprefix('fig')}": [f"figures/{name}.pdf"] for name in OF_THE_PAPER},
     "These together": [f"figures/{name}.pdf" for name in OF_THE_PAPER],

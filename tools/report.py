@@ -10,7 +10,6 @@ a graph of sixty rules as arcs.
 
 from __future__ import annotations
 
-import ast
 import base64
 import csv
 import importlib
@@ -32,6 +31,7 @@ from keystab.errors import InputError
 from keystab.provenance.code_digest import fingerprint
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.study_folder import Study
+from keystab.study.plan import FIGURES
 from keystab.study.verdicts import VERDICTS
 from keystab.utils.files import written_whole
 
@@ -83,7 +83,8 @@ def costs(logs: Path) -> list[dict[str, Any]]:
     """Jobs, seconds and largest memory of every rule, from the benchmark records."""
     rules: dict[str, list[dict[str, str]]] = {}
     for record in sorted((logs / "benchmarks").rglob("*.tsv")):
-        name = record.relative_to(logs / "benchmarks").parts[0].removesuffix(".tsv")
+        parts = record.relative_to(logs / "benchmarks").parts
+        name = parts[2 if parts[0] == "scenes" else 0].removesuffix(".tsv")  # of scenes/NAME/
         with record.open() as lines:
             rules.setdefault(name, []).extend(csv.DictReader(lines, delimiter="\t"))
     rows = [
@@ -106,13 +107,6 @@ def number(text: str) -> float:
         return 0.0
 
 
-def figures_of_study() -> list[str]:
-    """Names of the figures, in the order of the Snakefile."""
-    lines = [line for line in (ROOT / "Snakefile").read_text().splitlines() if "FIGURES" in line]
-    listed = [line.partition("= ")[2] for line in lines if line.startswith("FIGURES ")]
-    return [name for names in listed for name in ast.literal_eval(names)]
-
-
 def main(arguments: list[str]) -> int:
     """Write {results}/report.html."""
     overlays = [argument for argument in arguments if argument != "--configfile"]
@@ -132,10 +126,10 @@ def main(arguments: list[str]) -> int:
     html = environment.get_template(PAGE).render(
         version=keystab.__version__,
         draft=config["draft"],
-        figures=[figure(name, config) for name in figures_of_study()],
+        figures=[figure(name, config) for name in FIGURES],
         claims=listed,
         verdicts={name: sum(one["verdict"] == name for one in listed) for name in VERDICTS},
-        graph=drawn(graph, {*figures_of_study(), "claims"}),
+        graph=drawn(graph, {*FIGURES, "claims"}),
         costs=costs(ROOT / config["logs"]),
         machine=f"{os.cpu_count()} cores ({platform.machine()}), {platform.system()}, "
         f"Python {platform.python_version()}",

@@ -29,6 +29,7 @@ import yaml
 from keystab.errors import InputError
 from keystab.provenance.code_digest import CATALOGUES, PACKAGE_FOLDER, imported_modules
 from keystab.study import feasibility, settings
+from keystab.study.plan import FIGURES
 
 sys.path.insert(0, str(Path(__file__).parent))
 from study import Clock, read_durations  # noqa: E402
@@ -51,6 +52,8 @@ class Job(NamedTuple):
     inputs: tuple[str, ...]
     needs: frozenset[str]
     """First outputs of the jobs that make its inputs."""
+    place: int = 0
+    """Of its rule among all, in the order in which the workflow defines them."""
 
 
 Plan = dict[str, Job]
@@ -89,14 +92,14 @@ def plan(overlay: Mapping[str, Any] | None = None) -> Plan:
             )
             planned.dag(DAGSettings(forceall=True)).summary()
             workflow = planned._workflow
-            jobs = _jobs(workflow.dag, workflow.persistence)
+            jobs = _jobs(workflow.dag, workflow.persistence, [rule.name for rule in workflow.rules])
             os.chdir(here)
             return jobs
     finally:
         os.chdir(here)
 
 
-def _jobs(dag: Any, persistence: Any) -> Plan:
+def _jobs(dag: Any, persistence: Any, rules: list[str]) -> Plan:
     jobs: Plan = {}
     for level in dag.toposorted():
         for job in sorted(level, key=lambda job: job.output[0] if job.output else ""):
@@ -111,6 +114,7 @@ def _jobs(dag: Any, persistence: Any) -> Plan:
                     frozenset(persistence._params(job)),
                     tuple(map(str, persistence._input(job))),
                     frozenset(str(needed.output[0]) for needed in dag.dependencies[job]),
+                    rules.index(job.rule.name),
                 )
     return jobs
 
@@ -278,8 +282,8 @@ def effect(again: Plan, before: Plan, clock: Clock) -> Effect:
     """Return what runs again in words: rules, figures, and minutes one job at a time."""
     if not again:
         return NOTHING
-    figures = [name for name in _rules(before) if _is_figure(name)]
-    drawn = [name for name in _rules(again) if _is_figure(name)]
+    figures = [name for name in _rules(before) if name in FIGURES]
+    drawn = [name for name in _rules(again) if name in FIGURES]
     rules = [name for name in _rules(again) if name not in drawn]
     others = [name for name in _rules(before) if name not in figures and name not in rules]
     if len(others) < len(rules):
@@ -294,32 +298,10 @@ def effect(again: Plan, before: Plan, clock: Clock) -> Effect:
     )
 
 
-def _is_figure(rule: str) -> bool:
-    return rule in _figures()
-
-
-@functools.cache
-def _figures() -> list[str]:
-    lines = re.findall("^FIGURES .*", (ROOT / "Snakefile").read_text(), re.MULTILINE)
-    return re.findall(r'"(\w+)"', " ".join(lines))
-
-
 def _rules(jobs: Plan) -> list[str]:
     """Names of the rules of some jobs in the order in which the workflow defines them."""
-    names = {job.rule for job in jobs.values()}
-    return [name for name in _rules_in_order() if name in names]
-
-
-@functools.cache
-def _rules_in_order() -> list[str]:
-    snakefile = (ROOT / "Snakefile").read_text()
-    return [
-        name
-        for part in re.findall(r'^include: "(.*)"', snakefile, re.MULTILINE)
-        for name in re.findall(
-            r"^(?:use )?rule (?:\w+ as )?(\w+)", (ROOT / part).read_text(), re.MULTILINE
-        )
-    ]
+    places = {job.rule: job.place for job in jobs.values()}
+    return sorted(places, key=lambda name: places[name])
 
 
 def effects_of_settings(before: Plan, clock: Clock) -> dict[str, Effect]:

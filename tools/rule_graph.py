@@ -57,7 +57,7 @@ def column_of(rule: str, last: set[str]) -> int:
 
     Examples
     --------
-    >>> [column_of(name, {"fig1"}) for name in ("simulate", "find_truth", "match_grid", "fig1")]
+    >>> [column_of(name, {"fig1"}) for name in ("simulate", "detect", "match_grid", "fig1")]
     [0, 1, 2, 3]
     """
     if rule in last:

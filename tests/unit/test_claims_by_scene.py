@@ -44,7 +44,7 @@ def three(tmp_path):
 
 def compare(given, folder) -> int:
     out = ["--csv", str(folder / "out/pictures.csv"), "--markdown", str(folder / "out/pictures.md")]
-    return compare_claims.main(["--ledgers", *map(str, given.values()), "--names", *given, *out])
+    return compare_claims.main(["--verdicts", *map(str, given.values()), "--names", *given, *out])
 
 
 def test_a_verdict_that_differs_is_flagged_with_the_numbers_of_every_picture(

@@ -154,6 +154,42 @@ def test_a_colour_counts_for_the_figures_that_use_it(painted, old, new, changed)
     assert {name for name in before if before[name] != after[name]} == changed
 
 
+BLOCKS = """\
+from dataclasses import dataclass
+@dataclass
+class Scales:
+    \"\"\"Of what is detected.\"\"\"
+    sigma_min: float
+@dataclass
+class Detection(Scales):
+    epsilon: float
+@dataclass
+class Optics:
+    defocus: float
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "changed"),
+    [
+        ("defocus: float", "defocus: int", set()),
+        ("epsilon: float", "epsilon: int", {"detect"}),
+        ("sigma_min: float", "sigma_min: int", {"detect", "match"}),  # inherited
+        ("Of what is detected", "Of all", set()),
+    ],
+)
+def test_a_block_of_parameters_counts_for_the_stages_that_use_it(toy, old, new, changed):
+    (toy / "stages/detect.py").write_text("from toy.parameters import Detection\n")
+    (toy / "stages/match.py").write_text("from toy.parameters import Scales\n")
+    taken_before = {}
+    for text, found in ((BLOCKS, taken_before), (BLOCKS.replace(old, new), after := {})):
+        (toy / "parameters.py").write_text(text)
+        code_digest._read_catalogue.cache_clear()
+        found.update({name: taken(toy, f"toy.stages.{name}") for name in ("detect", "match")})
+    assert old in BLOCKS
+    assert {name for name in after if after[name] != taken_before[name]} == changed
+
+
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
@@ -161,7 +197,7 @@ def test_a_colour_counts_for_the_figures_that_use_it(painted, old, new, changed)
         ("ink.py", "from toy.figures.palette import *\n", "as a whole"),
         ("ink.py", "import toy.figures.palette\n", "says 'import toy.figures.palette'"),
         ("ink.py", "from toy.figures import palette\nC = palette.NONE\n", "has no NONE"),
-        ("palette.py", "INK = 1\nprint(INK)\n", "holds imports, constants and functions"),
+        ("palette.py", "INK = 1\nprint(INK)\n", "holds imports, constants, functions and classes"),
         ("palette.py", "INK = 1\nINK = 2\n", "defines INK twice"),
         ("palette.py", "INK = vars()\n", "must name the entries"),
     ],

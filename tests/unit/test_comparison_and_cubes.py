@@ -19,10 +19,10 @@ from keystab.experiments.sampling_stability import (
     change_counts,
     keypoints_of_samplings,
     long_matches,
+    positions_of_matches,
     summary,
 )
 from keystab.matching.common_range import comparable
-from keystab.stages._inputs import positions_of_matches
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
 KAPPA = 2 ** (1 / 3)

@@ -67,11 +67,11 @@ CLAIMS = ", ".join(f"'--{name}=x'" for name in ("claims", "tables", "csv", "json
     ("code", "forgotten"),
     [
         ("import keystab; keystab.__version__", False),
-        ("from keystab.stages import judge_claims", False),
+        ("from keystab.stages import check_claims", False),
         ("import keystab; keystab.balanced_delta", True),
         ("from keystab import InputError", True),
         ("from keystab.cli.main import main; main(['inspect', 'nothing'])", True),
-        (f"from keystab.stages.judge_claims import main; main([{CLAIMS}])", True),
+        (f"from keystab.stages.check_claims import main; main([{CLAIMS}])", True),
     ],
 )
 def test_the_library_forgets_when_it_is_used_and_not_when_it_is_imported(code, forgotten, tmp_path):

@@ -30,8 +30,8 @@ ROOMS = {
     "experiments": "root utils scalespace camera matching detection evaluation prediction",
     "study": "root utils scalespace camera io matching evaluation",
     "provenance": "root utils io evaluation study",
-    "stages": "root utils scalespace camera io matching detection evaluation truth prediction "
-    "experiments study provenance",
+    "stages": "root utils scalespace camera io matching detection evaluation truth experiments study "
+    "provenance",
     "figures": "root utils io",  # tables, and no science
     "cli": "root utils camera io detection truth provenance",
 }

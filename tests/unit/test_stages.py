@@ -13,13 +13,12 @@ from keystab.figures import _render, fig4
 from keystab.io.pictures import pixel_digest, write_picture
 from keystab.io.tables import read_table
 from keystab.stages import (
-    _run,
+    _command,
     count_refined,
     cut_cubes,
     detect,
-    detect_samplings,
     detect_views,
-    find_truth,
+    find_true_extrema,
     match_samplings,
     scale_space,
     scale_spaces,
@@ -29,7 +28,9 @@ from keystab.stages import (
 )
 
 STAGES = sorted(
-    path.stem for path in (Path(_run.__file__).parent).glob("*.py") if not path.stem.startswith("_")
+    path.stem
+    for path in (Path(_command.__file__).parent).glob("*.py")
+    if not path.stem.startswith("_")
 )
 DETECTOR = ["--sigma-min", "1.1", "--kappa", "1.2599210498948732", "--oversampling", "spline"]
 
@@ -47,7 +48,7 @@ def view_arguments(reference: Path, folder: Path, **changes: str) -> list[str]:
         "reference": str(reference),
         "reference-sha256": "None",
         "reference-blur": "0.0",
-        "set": "still",
+        "name": "still",
         "blur": "1.1",
         "step": "2",
         "shift-y": "0.0",
@@ -59,8 +60,8 @@ def view_arguments(reference: Path, folder: Path, **changes: str) -> list[str]:
         "whole": "False",
         "guard": "0",
         "dtype": "float32",
-        "store": str(folder / "views"),
-        "digest": str(folder / "views.sha256"),
+        "views": str(folder / "views"),
+        "views-digest": str(folder / "views.sha256"),
     } | {name.replace("_", "-"): value for name, value in changes.items()}
     return [text for name, value in options.items() for text in (f"--{name}", *value.split())]
 
@@ -69,7 +70,7 @@ def detect_arguments(folder: Path, name: str, *more: str) -> list[str]:
     return [
         *("--views", str(folder / "views"), "--views-digest", str(folder / "views.sha256")),
         *("--n-spo", "4", *DETECTOR, "--epsilon", "0.0", "--scale-moves", "True"),
-        *("--move", "nearest", "--max-offset", "None"),
+        *("--move", "nearest", "--max-offset", "0.5"),
         *("--extrema", str(folder / f"{name}.parquet")),
         *("--traces", str(folder / f"{name}_traces.parquet"), *more),
     ]
@@ -87,7 +88,7 @@ def test_stored_and_streamed_detections_are_the_same_to_the_bit(reference, tmp_p
     assert simulate.main(view_arguments(reference, tmp_path)) == 0
     views = ["--views", str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]
     store = ["--store", str(tmp_path / "n4")]
-    digest = ["--digest", str(tmp_path / "n4.sha256")]
+    digest = ["--store-digest", str(tmp_path / "n4.sha256")]
     assert scale_space.main([*views, "--n-spo", "4", *DETECTOR, *store, *digest]) == 0
     checked = [*store, "--store-digest", str(tmp_path / "n4.sha256")]
     assert detect.main(detect_arguments(tmp_path, "streamed")) == 0
@@ -112,7 +113,8 @@ def test_stored_and_streamed_detections_of_a_set_are_the_same_to_the_bit(referen
     assert simulate.main(view_arguments(reference, tmp_path, **several)) == 0
     stores, checksums = str(tmp_path / "stores"), str(tmp_path / "stores.sha256")
     assert (
-        scale_spaces.main(views_arguments(tmp_path, "--store", stores, "--digest", checksums)) == 0
+        scale_spaces.main(views_arguments(tmp_path, "--store", stores, "--store-digest", checksums))
+        == 0
     )
     search = [
         "--guard",
@@ -124,7 +126,7 @@ def test_stored_and_streamed_detections_of_a_set_are_the_same_to_the_bit(referen
         "--move",
         "nearest",
         "--max-offset",
-        "None",
+        "0.5",
     ]
     written = {}
     for how, more in (
@@ -146,7 +148,7 @@ def test_store_of_another_scale_space_is_refused(reference, tmp_path, capsys):
     simulate.main(view_arguments(reference, tmp_path))
     views = ["--views", str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]
     store = ["--store", str(tmp_path / "n5")]
-    digest = ["--digest", str(tmp_path / "n5.sha256")]
+    digest = ["--store-digest", str(tmp_path / "n5.sha256")]
     scale_space.main([*views, "--n-spo", "5", *DETECTOR, *store, *digest])
     capsys.readouterr()
     checked = [*store, "--store-digest", str(tmp_path / "n5.sha256")]
@@ -180,7 +182,7 @@ def test_a_damaged_scale_space_is_refused(reference, tmp_path, capsys):
     simulate.main(view_arguments(reference, tmp_path))
     views = ["--views", str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]
     store, digest = tmp_path / "n4", tmp_path / "n4.sha256"
-    written = ["--store", str(store), "--digest", str(digest)]
+    written = ["--store", str(store), "--store-digest", str(digest)]
     assert scale_space.main([*views, "--n-spo", "4", *DETECTOR, *written]) == 0
     chunk = max(store.rglob("c/*/*/*"), key=lambda file: file.stat().st_size)
     data = bytearray(chunk.read_bytes())
@@ -197,7 +199,7 @@ def test_a_damaged_scale_space_is_refused(reference, tmp_path, capsys):
 def test_stores_are_never_searched_without_their_checksums(tmp_path, capsys):
     with pytest.raises(SystemExit):
         detect.main(detect_arguments(tmp_path, "found", "--store", str(tmp_path / "n4")))
-    assert "--store and --store-digest go together" in capsys.readouterr().err
+    assert "--store, --store-digest go together" in capsys.readouterr().err
 
 
 COMPARED = ["--border", "3.0", "--first-scale", "1.2599210498948732"]
@@ -247,24 +249,21 @@ def test_the_truth_is_that_of_the_stored_view(reference, tmp_path):
     out = tmp_path / "truth.parquet"
     arguments = ["--views", *given, "--sigma-min", "1.2", "--kappa", "1.3"]
     arguments += ["--sigma-max", "2.4", "--table", str(out)]
-    assert find_truth.main(arguments) == 0
+    assert find_true_extrema.main(arguments) == 0
     view = read_view(tmp_path / "views", tmp_path / "views.sha256")
     found = read_table(out)
     assert len(found) > 3 and view.blur == 0.9
     assert found.equals(true_extrema(view.image, 0.9, 1.2, 2.4, 1.3))
 
 
-def test_samplings_at_once_are_those_one_by_one_and_single_detections_are_scored(
-    reference, tmp_path
-):
+def test_single_detections_of_several_scenes_are_scored(reference, tmp_path):
     assert simulate.main(view_arguments(reference, tmp_path, step="3")) == 0
     views = ["--views", str(tmp_path / "views"), "--views-digest", str(tmp_path / "views.sha256")]
-    at_once = [str(tmp_path / "all.parquet")]
-    given = [*views, "--n-spo", "3", "4", *DETECTOR, "--epsilon", "0.0", "--extrema", *at_once]
-    assert detect_samplings.main(given) == 0
-    assert detect.main(detect_arguments(tmp_path, "n4")) == 0
-    extrema, alone = read_table(tmp_path / "all.parquet"), read_table(tmp_path / "n4.parquet")
-    assert extrema[extrema["n_spo"] == 4].reset_index(drop=True).equals(alone)
+    for n_spo in ("3", "4"):
+        arguments = detect_arguments(tmp_path, f"n{n_spo}")
+        arguments[arguments.index("--n-spo") + 1] = n_spo
+        assert detect.main(arguments) == 0
+    samplings = [str(tmp_path / f"n{n_spo}.parquet") for n_spo in (3, 4)]
 
     same = [
         "--space-tolerance",
@@ -280,19 +279,22 @@ def test_samplings_at_once_are_those_one_by_one_and_single_detections_are_scored
     names = ("matches", "counts", "keypoints", "occurrence", "summary")
     tables = [text for name in names for text in (f"--{name}", str(tmp_path / f"{name}.csv"))]
     asked = ["--n-spo", "3", "4", *scales, *same, *compared, *labels]
-    assert match_samplings.main([*views, "--samplings", *at_once, *asked, *tables]) == 0
+    assert match_samplings.main([*views, "--samplings", *samplings, *asked, *tables]) == 0
     truth = str(tmp_path / "truth.parquet")
-    assert find_truth.main([*views, *scales, "--sigma-max", "2.4", "--table", truth]) == 0
+    assert find_true_extrema.main([*views, *scales, "--sigma-max", "2.4", "--table", truth]) == 0
 
-    picture = [*views[1::2], str(tmp_path / "keypoints.csv"), truth, *at_once]
-    pictures = ["--picture", "one", *picture, "--picture", "two", *picture]
+    scenes = [
+        *("--names", "one", "two", "--views", *[views[1]] * 2, "--views-digest", *[views[3]] * 2),
+        *("--keypoints", *[str(tmp_path / "keypoints.csv")] * 2, "--truth", truth, truth),
+        *("--samplings", *samplings, *samplings),
+    ]
     split = ["--end", "2.0", "--block", "20.0", "--n-folds", "3", "--n-resamples", "100"]
     names = ("detections", "auc", "gain", "roc")
     tables = [text for name in names for text in (f"--{name}", str(tmp_path / f"{name}.csv"))]
-    assert score_predictors.main([*pictures, *asked, *split, *tables]) == 0
+    assert score_predictors.main([*scenes, *asked, *split, *tables]) == 0
     scored, auc = read_table(tmp_path / "detections.csv"), read_table(tmp_path / "auc.csv")
     assert len(scored) > 10 and set(scored["n_spo"]) == {3, 4}
-    # The same picture twice: the same predictors, and the same areas of those that learn nothing.
+    # The same scene twice: the same predictors, and the same areas of those that learn nothing.
     areas = auc[auc["validation"] == "none"].pivot(
         index=["label", "predictor"], columns="picture", values="auc"
     )
@@ -358,8 +360,8 @@ def test_blur_of_the_reference_adds_to_that_of_the_camera(reference, tmp_path):
     ],
 )  # fmt: skip
 def test_machines_at_their_limits_get_one_line(error, line, capsys):
-    @_run.stage
-    def main(argv=None):
+    @_command.command
+    def main():
         raise error
 
     assert main([]) == 2
@@ -367,8 +369,8 @@ def test_machines_at_their_limits_get_one_line(error, line, capsys):
 
 
 def test_defects_keep_their_traceback():
-    @_run.stage
-    def main(argv=None):
+    @_command.command
+    def main():
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):

@@ -27,10 +27,10 @@ def sets(tmp_path_factory) -> list[Path]:
     for noise in NOISES:
         member = folder / f"noise_{noise}"
         member.mkdir()
-        views = ["--store", str(member / "views"), "--digest", str(member / "views.sha256")]
+        views = ["--views", str(member / "views"), "--views-digest", str(member / "views.sha256")]
         arguments = [
             *("--reference", str(folder / "scene.tif"), "--reference-sha256", "None"),
-            *("--reference-blur", "0.0", "--set", "noise", "--blur", "0.8", "--step", "2"),
+            *("--reference-blur", "0.0", "--name", "noise", "--blur", "0.8", "--step", "2"),
             *("--shift-y", "0.0", "--shift-x", "0.0", "--rotation", "0.0"),
             *("--noise", *[str(noise)] * N_VIEWS, "--height", "None", "--width", "None"),
             *("--whole", "False", "--guard", "0", "--dtype", "float64", *views),
@@ -41,7 +41,7 @@ def sets(tmp_path_factory) -> list[Path]:
             *("--n-spo", "4", "--assumed-blur", "None", "--n-oct", "2", "--delta-min", "None"),
             *("--sigma-min", "1.1", "--kappa", KAPPA, "--oversampling", "spline"),
             *("--guard", "0", "--epsilon", "0.0", "--scale-moves", "True", "--move", "nearest"),
-            *("--max-offset", "None", "--extrema", str(member / "extrema.parquet")),
+            *("--max-offset", "0.5", "--extrema", str(member / "extrema.parquet")),
             *("--traces", str(member / "traces.parquet")),
         ]
         assert detect_views.main(arguments) == 0
@@ -110,9 +110,13 @@ def test_curves_and_counts_are_the_same_without_scales(sets, tmp_path):
     "given", [["--starts", "1.1"], ["--seen-by", "0.7"], ["--starts", "1.1", "--seen-by", "0.7"]]
 )
 def test_starts_and_scales_go_together(sets, tmp_path, capsys, given):
-    with pytest.raises(SystemExit):
-        match_sweep.main(matching(sets, tmp_path, *given))
-    assert "--starts, --seen-by and --scales go together" in capsys.readouterr().err
+    try:
+        status = match_sweep.main(matching(sets, tmp_path, *given))
+    except SystemExit as end:
+        status = end.code
+    assert status == 2
+    assert "go together: give all or none" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def cropping(sets, folder, size):

@@ -71,7 +71,7 @@ rule claims:
     log: "logs/claims.log"
     benchmark: "logs/benchmarks/claims.tsv"
     message: "Judging"
-    shell: "python -m keystab.stages.judge_claims --claims {input.claims} --tables results/tables --csv {output.csv} --json {output.json} --markdown {output.md} >{log} 2>&1"
+    shell: "python -m keystab.stages.check_claims --claims {input.claims} --tables {input.tables} --csv {output.csv} --json {output.json} --markdown {output.md} >{log} 2>&1"
 
 rule fig1:
     input: "results/tables/fig1.csv"

@@ -408,7 +408,7 @@ def test_the_real_study_is_finished_without_its_intermediate_files(touched, tmp_
     study = Study(touched.folder, ["config/quick.yaml"])
     contents = archive.Contents.of(study)
     left_out = {output.rule for output in contents.left_out}
-    assert left_out >= {"simulate", "detect", "detect_stored", "scale_space", "match_samplings"}
+    assert left_out >= {"simulate", "detect", "scale_space", "match_samplings"}
     assert not left_out & {"fig5", "score_features", "claims"}
     with unpacked(archive.pack(study, tmp_path / "quick.zip")) as held:
         assert not (held.folder / "results/quick/keypoints").exists()

@@ -8,39 +8,39 @@ import time
 import pytest
 from project import QUICK
 
-FIGURES = {f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")} | {
-    "floor",
-    "truth",
-    "refinement",
-    "predictors",
-}
+from keystab.study import plan
+
+FIGURES = set(plan.FIGURES)
+
 PREDICTING = {"score_predictors", "predictors"}
 AFTER_MATCHING = {"score_features", "cut_cubes", "fig4", "fig5", "fig6"}
-AFTER_MATCHING |= {"judge_keypoints", "truth"} | PREDICTING
-SAMPLINGS = {"match_grid", "match_samplings", "match_picture", "fig3"} | AFTER_MATCHING
-VIEWS = {"match_views", "match_shipped", "fig7", "fig8", "figS1"}
+AFTER_MATCHING |= {"evaluate_keypoints", "truth"} | PREDICTING
+SAMPLINGS = {"match_grid", "match_samplings", "fig3"} | AFTER_MATCHING
+VIEWS = {"match_views", "match_sift", "fig7", "fig8", "figS1"}
 SWEEPS = {"match_sweep", "match_aliasing", "match_blurs", "fig10", "fig11", "fig12", "figS2"}
 KAPPAS = {"match_kappas", "fig9"}
 BLOBS = {"match_blobs", "figS4"}
 VARIANTS = {"match_variants", "floor"}
 MATCHING = SAMPLINGS | VIEWS | SWEEPS | KAPPAS | VARIANTS
-ACCEPTING = {"judge_samplings", "judge_cosine", "judge_kappas", "judge_views", "truth"}
-JUDGING = ACCEPTING | {"judge_grid", "judge_keypoints", "judge_refinement", "refinement"}
-JUDGING |= PREDICTING
-TRUTHS = {"find_truth", "find_truth_of_kappa", "find_scene", "find_truth_of_picture"}
-# What is done with further pictures, and does not depend on the view of the reference.
-OF_PICTURES = {"detect_picture", "match_picture", "find_truth_of_picture"}
-ONE_VIEW = {"detect", "detect_stored", "detect_grid", "count_refined"} | SAMPLINGS
-DETECTION = ONE_VIEW | {"detect_views", "detect_kappas", "detect_variant"} | MATCHING | JUDGING
-DETECTION |= {"detect_cosine", "detect_picture"}
-STILL = (
-    {"simulate", "scale_space", "detect_kappas", "detect_variant"} | ONE_VIEW | KAPPAS | VARIANTS
-)
-STILL = (STILL | TRUTHS | JUDGING | {"detect_cosine"}) - OF_PICTURES
+ACCEPTING = {"evaluate_samplings", "evaluate_cosine", "evaluate_kappas", "evaluate_views", "truth"}
+EVALUATING = ACCEPTING | {
+    "evaluate_grid",
+    "evaluate_keypoints",
+    "evaluate_refinement",
+    "refinement",
+}
+EVALUATING |= PREDICTING
+TRUTHS = {"find_true_extrema", "find_scene_extrema"}
+ONE_VIEW = {"detect", "detect_grid", "count_refined"} | SAMPLINGS
+DETECTION = ONE_VIEW | {"detect_views", "detect_kappas", "detect_variant"} | MATCHING | EVALUATING
+DETECTION |= {"detect_cosine"}
+STILL = {"simulate", "scale_space", "detect_kappas", "detect_variant", "detect_cosine"} | ONE_VIEW
+STILL |= KAPPAS | VARIANTS | TRUTHS | EVALUATING
 SIMULATION = STILL | DETECTION | TRUTHS | {"describe_views", "crop_views", "fig2"}
-SIMULATION |= {"simulate_picture"}
 THEORY = {"semigroup", "noise_theory", "camera_optics", "detect_blobs"} | BLOBS
 EVERYTHING = SIMULATION | FIGURES | THEORY
+MORE = "from __future__ import annotations"
+MORE = (MORE, f"{MORE}\nMORE = 1")
 
 
 def reruns(project, *overlays: str) -> set[str]:
@@ -64,15 +64,23 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
         ("src/keystab/detection/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
         ("src/keystab/detection/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
         ("src/keystab/detection/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS | {"detect_blobs"}),
-        ("src/keystab/evaluation/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "judge_keypoints", "truth"} | PREDICTING),
+        ("src/keystab/evaluation/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "evaluate_keypoints", "truth"} | PREDICTING),
         ("src/keystab/__init__.py", '"fit_psf": ', '"blob_image": "scalespace.gaussian_blobs",\n    "fit_psf": ', set()),
-        ("src/keystab/stages/cut_cubes.py", "    args = ", "    MORE = 1\n    args = ", {"cut_cubes", "fig6"}),
+        ("src/keystab/stages/cut_cubes.py", "    unique = ", "    MORE = 1\n    unique = ", {"cut_cubes", "fig6"}),
         ("src/keystab/study/settings.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", set()),
         ("src/keystab/figures/palette.py", '"condition": "#A8458A"', '"condition": "#A8458B"', {"fig5"}),
         ("src/keystab/figures/palette.py", '"""Predictors of stability', '"""Features', set()),
         ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
-        ("src/keystab/camera/simulation.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", SIMULATION),
+        ("src/keystab/camera/simulation.py", *MORE, SIMULATION),
+        # The contract for code: what depends on it, and nothing else.
+        ("src/keystab/__init__.py", '    "InputError": "errors",', '    "another": "errors",\n    "InputError": "errors",', set()),
+        ("src/keystab/evaluation/intervals.py", *MORE, (MATCHING | EVALUATING) - KAPPAS),
+        ("src/keystab/evaluation/recall_precision.py", *MORE, EVALUATING),
+        ("src/keystab/detection/sift_filters.py", *MORE, {"match_sift", "fig7"}),
+        ("src/keystab/utils/validation.py", *MORE, EVERYTHING - {"simulate", "describe_views", "semigroup", "crop_views", "fig1", "fig2"}),
+        ("src/keystab/parameters.py", "        str | None, Setting(\"reference_sha256\"", "        None | str, Setting(\"reference_sha256\"", SIMULATION),
+        ("src/keystab/parameters.py", "@dataclass(frozen=True)\nclass Optics:", "class _More:\n    pass\n\n\n@dataclass(frozen=True)\nclass Optics:", set()),
         ("workflow/report/fig3.rst", "", "A better caption. ", set()),
         ("workflow/rules/detect.smk", "rule detect:\n", "# a comment\nrule detect:\n", set()),
         ("config/config.yaml", "detector:\n", "# a comment\ndetector:\n", set()),
@@ -107,29 +115,29 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
     [
         ("comparison: {border: 3}", set()),  # 3.0
         ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS | BLOBS | ACCEPTING),
-        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "judge_grid", "detect_variant"} - VARIANTS - OF_PICTURES),
+        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "evaluate_grid", "detect_variant"} - VARIANTS),
         ("comparison: {match_sign: true}", MATCHING),
         ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS | SWEEPS | VARIANTS),
-        ("comparison: {scale_ratio: 1.5}", MATCHING | JUDGING),
+        ("comparison: {scale_ratio: 1.5}", MATCHING | EVALUATING),
         ("stability: {seen_by: 0.6}", {"match_sweep", "fig11", "fig12"}),
         # The inputs stay the same, but others belong to this variant.
         ("floor: {variants: {closer_1e6: {set: still}}}", VARIANTS),
-        ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "judge_views", "truth"}),
+        ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "evaluate_views", "truth"}),
         ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
-        ("comparison: {stable_above: 0.9}", {"match_samplings", "match_picture"} | AFTER_MATCHING),
+        ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("predictors: {block: 25.0}", PREDICTING),
-        ("predictors: {pictures: {stream: {step: 22}}}", OF_PICTURES | PREDICTING | {"simulate_picture"}),
+        ("predictors: {pictures: {stream: {step: 22}}}", {"simulate", "detect", "match_samplings", "find_true_extrema"} | PREDICTING),
         ("cubes: {count: 3}", {"cut_cubes", "fig6"}),
         ("optics: {defocus: 20.0}", {"camera_optics", "figS3"}),
         ("blobs: {camera_blur: 0.7}", BLOBS | {"detect_blobs"}),
         ("semigroup: {blob: 1.0}", {"semigroup", "fig1"}),
         ("stability: {n_resamples: 200}", VIEWS | {"match_sweep", "match_aliasing", "fig10", "fig11", "fig12"}),
-        ("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7", "judge_refinement", "refinement"}),
-        ("shipped: {contrast: 0.02}", {"match_shipped", "fig7"}),
-        ("kappas: {fractions: [2, 3, 10]}", {"detect_kappas", "judge_kappas", "truth"} | KAPPAS),
+        ("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7", "evaluate_refinement", "refinement"}),
+        ("shipped: {contrast: 0.02}", {"match_sift", "fig7"}),
+        ("kappas: {fractions: [2, 3, 10]}", {"detect_kappas", "evaluate_kappas", "truth"} | KAPPAS),
         ("sets: {zooms: {zoom: 1.4}}", {"simulate", "detect_views", "match_views", "fig8"}),
-        ("truth: {last_scale: 1.9}", JUDGING | TRUTHS),
-        ("truth: {most_iterations: 4}", {"judge_refinement", "refinement"}),
+        ("truth: {last_scale: 1.9}", EVALUATING | TRUTHS),
+        ("truth: {most_iterations: 4}", {"evaluate_refinement", "refinement"}),
         ("draft: false", FIGURES),
         # 1.1 is also the blur and 0.0 also the shift: the set of values stays the same.
         ("sets: {still: {noise: 1.1, step: 20}}", STILL),

@@ -47,7 +47,7 @@ def test_detections_of_a_stored_scale_space(project):
     data = bytearray(chunk.read_bytes())
     data[len(data) // 2] ^= 1
     chunk.write_bytes(data)
-    run = project.snakemake(*tiny(project, "[3]"), "--forcerun", "detect_stored", "--", target)
+    run = project.snakemake(*tiny(project, "[3]"), "--forcerun", "detect", "--", target)
     assert run.returncode != 0
     assert "Traceback" not in run.stdout
     log = (project.folder / "logs/tiny/detect/n3.log").read_text()

@@ -103,7 +103,7 @@ def test_jobs_through_slurm(slurm, tmp_path):
     # one step, 3 scales per octave: 0.6 s; and three copies of 128 rows of 5 slices of 160 x 3
     # doubles, 7.4 MB, above 600 of Python
     assert asked["scale_space"] == ["00:06:00", "1", "608M"]
-    assert asked["detect_stored"] == ["00:06:00", "1", "608M"]
+    assert asked["detect"] == ["00:06:00", "1", "608M"]
 
     local = copy_of_project(tmp_path / "local", own_library=False)
     run = local.snakemake(*QUICK, "--", *TARGETS)

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import importlib
 import re
+import runpy
 from pathlib import Path
 
 import pytest
-from project import ROOT
+from project import QUICK, ROOT
 
 from keystab.study.claims_report import FIELDS
+from keystab.study.plan import FIGURES
 
 PICTURES = sorted((ROOT / "config/pictures").glob("*.yaml"))
 LEDGER = f"{','.join(FIELDS)}\none,,,,,,,,,reproduced,\n"
 RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
-FIGURES = [f"fig{n}" for n in (*range(1, 13), "S1", "S2", "S3", "S4")] + ["floor", "predictors"]
 
 
 def test_whole_study_at_the_papers_settings(project):
     jobs = project.would_run()
     assert {*FIGURES, "all"} <= jobs.keys()
-    assert (jobs["detect"], jobs["detect_stored"], jobs["scale_space"]) == (14, 3, 3)
-    assert sum(jobs.values()) <= 200  # fat jobs
+    # Of the default scene and two further ones, of which no scale-space is kept.
+    assert (jobs["detect"], jobs["scale_space"]) == (3 * 17, 3)
+    assert sum(jobs.values()) <= 230  # fat jobs
     assert "claims" in jobs and "claims_pictures" not in jobs  # which needs several studies
 
 
@@ -34,11 +36,11 @@ def test_whole_study_at_the_papers_settings(project):
         ("figures/quick/fig2.png", {"simulate", "describe_views", "fig2"}),
         ("figures/quick/fig12.pdf", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12"}),
         ("figures/quick/figS2.pdf", {"simulate", "detect_views", "match_blurs", "figS2"}),
-        ("figures/quick/fig6.pdf", {"simulate", "scale_space", "detect_stored", "detect", "match_samplings", "cut_cubes", "fig6"}),
-        ("figures/quick/fig7.pdf", {"simulate", "detect_views", "match_views", "match_shipped", "fig7"}),
+        ("figures/quick/fig6.pdf", {"simulate", "scale_space", "detect", "match_samplings", "cut_cubes", "fig6"}),
+        ("figures/quick/fig7.pdf", {"simulate", "detect_views", "match_views", "match_sift", "fig7"}),
         ("figures/quick/fig9.pdf", {"simulate", "detect_kappas", "match_kappas", "fig9"}),
         ("figures/quick/figS1.png", {"simulate", "detect_views", "match_views", "figS1"}),
-        ("figures/quick/predictors.pdf", {"simulate", "scale_space", "detect_stored", "detect", "match_samplings", "find_truth", "simulate_picture", "detect_picture", "match_picture", "find_truth_of_picture", "score_predictors", "predictors"}),
+        ("figures/quick/predictors.pdf", {"simulate", "scale_space", "detect", "match_samplings", "find_true_extrema", "score_predictors", "predictors"}),
     ],
 )  # fmt: skip
 def test_figures_need_only_what_they_show(project, target, rules):
@@ -48,8 +50,11 @@ def test_figures_need_only_what_they_show(project, target, rules):
 @pytest.mark.parametrize(("keep", "stored"), [("true", 6), ("false", 0)])
 def test_any_sampling_can_be_stored_or_streamed(project, keep, stored):
     project.edit("config/quick.yaml", "keep_scale_spaces: [3]", f"keep_scale_spaces: {keep}")
-    jobs = project.would_run("--configfile", "config/quick.yaml")
-    assert (jobs.get("detect_stored", 0), jobs.get("detect", 0)) == (stored, 6 - stored)
+    _, said = project.dry_run("--configfile", "config/quick.yaml", "--printshellcmds")
+    commands = [line for line in said.splitlines() if "stages.detect " in line]
+    own = [line for line in commands if "/scenes/" not in line and "--oversampling spline" in line]
+    assert len(own) == 6 and sum("--store-digest" in line for line in own) == stored
+    assert not any("--store" in line for line in set(commands) - set(own))
 
 
 @pytest.mark.parametrize("overlay", sorted((ROOT / "config/what_if").glob("*.yaml")), ids=str)
@@ -91,33 +96,68 @@ def test_a_picture_that_is_the_reference_is_not_seen_twice(project):
     )
     target = ("--configfile", "config/quick.yaml", "own.yaml", "--", "figures/quick/predictors.pdf")
     code, said = project.dry_run(*target)
-    assert code == 0 and "picture 'coldwarm'" in said and "picture 'stream'" not in said
+    assert code == 0 and "scene 'coldwarm'" in said and "scene 'stream'" not in said
 
 
 @pytest.mark.parametrize("figure", FIGURES)
 def test_rules_of_figures_take_the_tables_that_the_figures_read(figure):
     tables = importlib.import_module(f"keystab.figures.{figure.lower()}").TABLES
-    text = (ROOT / "workflow/rules/figures.smk").read_text()
-    block = re.search(rf"^(?:use )?rule (?:fig1 as )?{figure}\b.*?output:", text, re.M | re.S)
-    assert block
-    assert re.findall(r'f"{RESULTS}/tables/(.*)",', block[0]) == list(tables)
+    assert FIGURES[figure].tables == tuple(tables)
+
+
+# Further scenes
+
+
+def test_a_further_scene_is_studied_by_the_same_rules(project):
+    quick = ("--configfile", "config/quick.yaml", "--")
+    jobs = project.would_run(*quick, "results/quick/scenes/stream/final.sha256")
+    own = project.would_run(*quick, "results/quick/final.sha256")
+    # All but what kept scale-spaces, several scenes and the figures of theory ask for.
+    assert own.keys() - jobs.keys() == {"scale_space", "score_predictors", "predictors", "fig1", "figS3", "figS4"}  # fmt: skip
+    assert jobs.keys() <= own.keys() and sum(jobs.values()) <= sum(own.values())
+    target = "figures/quick/scenes/stream/fig5.pdf"
+    assert project.would_run(*quick, target).keys() == {"simulate", "detect", "match_samplings", "score_features", "fig5"}  # fmt: skip
+
+
+def test_a_scene_that_is_not_in_the_settings_is_refused(project):
+    status, said = project.dry_run(
+        "--configfile", "config/quick.yaml", "--", "results/quick/scenes/roof/claims.csv"
+    )
+    assert status != 0 and "MissingRuleException" in said
+
+
+def test_a_change_of_the_view_of_the_default_scene_touches_no_other(finished):
+    (finished.folder / "config/change.yaml").write_text("sets: {still: {noise: 0.01}}\n")
+    _, said = finished.dry_run(*QUICK, "config/change.yaml")
+    assert "Simulating the views 'still'" in said and "Scoring predictors" in said
+    assert "scene 'stream'" not in said
+
+
+# What every rule keeps
+
+
+@pytest.fixture(scope="module")
+def jobs():
+    tool = runpy.run_path(str(ROOT / "tools/reruns.py"))
+    return list(tool["plan"]().values())
+
+
+def test_every_job_says_what_it_does_and_depends_on_its_code_and_the_software(jobs):
+    assert len(jobs) > 200
+    for job in jobs:
+        assert job.message and job.template == "{params.command} >{log:q} 2>&1", job
+        module = job.command.split()[2]
+        names = {text.partition(" = ")[0] for text in job.params}
+        assert {f"code of {module}", "environment.lock"} <= names, job
+
+
+def test_parameters_are_compared_with_their_names(jobs):
+    # Plain values would be compared as a set, without names; see Named.
+    for job in jobs:
+        assert all(re.match(r"(code of )?[\w.]+ = ", text) for text in job.params), job
 
 
 @pytest.mark.parametrize("path", RULES, ids=lambda path: path.name)
-def test_rules_keep_the_rules(path: Path):
+def test_every_file_of_rules_says_what_comes_in_and_what_goes_out(path: Path):
     text = path.read_text()
-    assert text.startswith('"""'), "says what comes in, what goes out, and which steps"
-    assert not re.search(r"^ +(run|script|notebook|group|cache):", text, re.M)
-    assert "lambda" not in text
-    for rule in re.split(r"^(?=rule \w+:)", text, flags=re.M)[1:]:
-        for directive in ("log", "benchmark", "message", "shell"):
-            assert re.search(rf"^    {directive}:", rule, re.M), (rule.split(":")[0], directive)
-        assert "code=fingerprint(" in rule and "software=SOFTWARE" in rule
-
-
-@pytest.mark.parametrize("path", RULES, ids=lambda path: path.name)
-def test_settings_reach_rules_with_their_names(path: Path):
-    # Plain values would be compared as a set, without names; see Named in common.smk.
-    for block in re.findall(r"^    params:\n((?:        .*\n)+)", path.read_text(), re.M):
-        assert "config[" not in block and "lookup(" not in block
-        assert "Named(" not in block  # a constant loses its name: fixed(...)
+    assert text.startswith('"""') and "Comes in:" in text and "Goes out:" in text

@@ -1,30 +1,24 @@
-"""One list of all that the study ends in, so that a record holds its digests.
+"""One list of all that the study of a scene ends in, so that a record holds its checksums.
 
-Comes in: all figures, tables and verdicts. Goes out: {results}/final.sha256. Snakemake writes down
-what a job was made from; of files that nothing is made from it would know no digest, and whoever
-changed one would not be noticed.
+Comes in: all figures, tables and verdicts. Goes out: final.sha256. Snakemake writes down what a job
+was made from; of files that nothing is made from it would know no checksum, and whoever changed one
+would not be noticed.
 """
 
 
 rule checksums:
     """SHA-256 of every figure, table and verdict."""
     input:
-        FINAL,
+        files=placed(plan.final_files, RESULTS, config["figures"], CLAIMED),
     output:
-        f"{RESULTS}/final.sha256",
+        checksums=f"{HERE}final.sha256",
     log:
-        f"{LOGS}/checksums.log",
+        f"{LOG}checksums.log",
     benchmark:
-        f"{LOGS}/benchmarks/checksums.tsv"
+        f"{BENCHMARK}checksums.tsv"
     params:
-        code=fingerprint("keystab.stages.list_checksums"),
-        software=SOFTWARE,
+        **stage("list_checksums"),
     message:
-        "Listing the digests of all figures, tables and verdicts"
+        "Listing the digests of all figures, tables and verdicts{params.scene}"
     shell:
-        """
-        python -m keystab.stages.list_checksums \
-            --files {input:q} \
-            --list {output:q} \
-            >{log:q} 2>&1
-        """
+        "{params.command} >{log:q} 2>&1"

@@ -1,61 +1,74 @@
 """The simulated camera (section 4 of the paper).
 
-Comes in: the reference picture. Goes out: one store per set of views, {results}/views/{set}, with
-a file of digests beside it. Steps: check the picture's pixels; blur and sample the reference for
-every view of the set; write the store; seal it.
+Comes in: the picture of a scene. Goes out: one store per set of views, views/{set}, with a file of
+checksums beside it, and tables of what figures 2 and 12 show of views. Steps: check the picture's
+pixels; blur and sample the picture for every view of the set; write the store; list its checksums;
+write pixels as numbers.
 """
 
 
 rule simulate:
     """Simulate one set of views of the scene."""
     input:
-        reference=local(config["reference"]),
+        reference=local(of(plan.setting, "reference")),
     output:
-        store=directory(f"{RESULTS}/views/{{set}}"),
-        digest=f"{RESULTS}/views/{{set}}.sha256",
+        views=directory(f"{HERE}views/{{set}}"),
+        views_digest=f"{HERE}views/{{set}}.sha256",
     log:
-        f"{LOGS}/simulate/{{set}}.log",
+        f"{LOG}simulate/{{set}}.log",
     benchmark:
-        f"{LOGS}/benchmarks/simulate/{{set}}.tsv"
+        f"{BENCHMARK}simulate/{{set}}.tsv"
     resources:
-        mem_mb=memory_of_reference,
+        mem_mb=growing(job_resources.megabytes_of_reference),
     params:
-        reference_sha256=setting("reference_sha256"),
-        reference_blur=setting("reference_blur"),
-        blur=of_every_view("blur"),
-        step=of_every_view("step"),
-        shift_y=of_every_view("shift_y"),
-        shift_x=of_every_view("shift_x"),
-        rotation=of_every_view("rotation"),
-        noise=of_every_view("noise"),
-        height=setting("sets.{set}.height"),
-        width=setting("sets.{set}.width"),
-        whole=setting("sets.{set}.whole"),
-        guard=setting("sets.{set}.guard"),
-        dtype=dtype_of_set,
-        code=fingerprint("keystab.stages.simulate"),
-        software=SOFTWARE,
+        **stage(
+            "simulate", parameters.Reference, parameters.Camera, "sets.{set}.dtype", name="{set}"
+        ),
     message:
-        "Simulating the views '{wildcards.set}'"
+        "Simulating the views '{wildcards.set}'{params.scene}"
     shell:
-        """
-        python -m keystab.stages.simulate \
-            --reference {input.reference:q} \
-            --reference-sha256 {params.reference_sha256} \
-            --reference-blur {params.reference_blur} \
-            --set {wildcards.set} \
-            --blur {params.blur} \
-            --step {params.step} \
-            --shift-y {params.shift_y} \
-            --shift-x {params.shift_x} \
-            --rotation {params.rotation} \
-            --noise {params.noise} \
-            --height {params.height} \
-            --width {params.width} \
-            --whole {params.whole} \
-            --guard {params.guard} \
-            --dtype {params.dtype} \
-            --store {output.store:q} \
-            --digest {output.digest:q} \
-            >{log:q} 2>&1
-        """
+        "{params.command} >{log:q} 2>&1"
+
+
+rule describe_views:
+    """Figure 2: what the simulated views look like, in numbers."""
+    input:
+        views=ancient(f"{HERE}views/examples"),
+        views_digest=f"{HERE}views/examples.sha256",
+    output:
+        table=f"{HERE}tables/fig2.csv",
+        pixels=f"{HERE}tables/fig2_pixels.parquet",
+    log:
+        f"{LOG}describe_views.log",
+    benchmark:
+        f"{BENCHMARK}describe_views.tsv"
+    params:
+        **stage("describe_views"),
+    message:
+        "Describing the example views{params.scene}"
+    shell:
+        "{params.command} >{log:q} 2>&1"
+
+
+rule crop_views:
+    """Figure 12 b: a piece of a view at every noise."""
+    input:
+        views=ancient(files("views/{}", plan.sets_of_figure, "fig12")),
+        views_digest=files("views/{}.sha256", plan.sets_of_figure, "fig12"),
+    output:
+        table=f"{HERE}tables/fig12_pixels.parquet",
+    log:
+        f"{LOG}crop_views.log",
+    benchmark:
+        f"{BENCHMARK}crop_views.tsv"
+    params:
+        **stage(
+            "crop_views",
+            name="noise",
+            values=column("value", plan.searches_of_figure, "fig12"),
+            size=64,
+        ),
+    message:
+        "Cropping views with noise {params.values}{params.scene}"
+    shell:
+        "{params.command} >{log:q} 2>&1"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keystab.camera.views import ViewSpec, to_reference, to_view
+
+RIM = 4.0
+"""Pixels around what all views have in common in which extrema are sought too."""
 
 
 def to_common_frame(
@@ -124,6 +128,47 @@ def windows_of_common_field(
         y, x = (np.round(part, 9) for part in to_view(spec, reference_shape, *field.T))
         windows.append((float(y.min()), float(y.max()), float(x.min()), float(x.max())))
     return windows
+
+
+def searched_windows(
+    specs: Sequence[ViewSpec], reference_shape: tuple[int, int], guard: float
+) -> list[tuple[float, float, float, float] | None]:
+    """Part of each view in which extrema are sought: what all views have in common, and a rim.
+
+    No keypoint beyond it is ever compared. The rim is for what the refinement moves and for
+    neighbours that are the same; windows end at every fourth pixel, so that views that differ by a
+    fraction of a pixel are searched alike.
+
+    Parameters
+    ----------
+    specs, reference_shape
+        See `in_common_field`.
+    guard : float
+        Width of the guard band of every view, in its pixels.
+
+    Returns
+    -------
+    list of (float, float, float, float) or None
+        See `windows_of_common_field`; None for the whole view, where there is no guard band.
+
+    Examples
+    --------
+    >>> specs = [ViewSpec(1.1, 10.0, (40, 40), (0.0, shift)) for shift in (0.0, 2.0)]
+    >>> searched_windows(specs, (400, 400), 9)
+    [(4.0, 36.0, 4.0, 36.0), (4.0, 36.0, 4.0, 36.0)]
+    """
+    if guard == 0:
+        return [None] * len(specs)
+    windows = windows_of_common_field(specs, reference_shape, guard)
+    return [
+        (
+            4.0 * math.floor((top - RIM) / 4),
+            4.0 * math.ceil((bottom + RIM) / 4),
+            4.0 * math.floor((left - RIM) / 4),
+            4.0 * math.ceil((right + RIM) / 4),
+        )
+        for top, bottom, left, right in windows
+    ]
 
 
 def _cut(corners: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:

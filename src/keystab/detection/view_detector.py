@@ -7,7 +7,7 @@ Nothing is accepted or discarded here. The traces hold the positions of all mode
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,6 +128,42 @@ def detect_in_view(
         followed.append(models.assign(keypoint=number[keypoint])[mask[keypoint]])
         first += int(mask.sum())
     return pd.concat(kept, ignore_index=True), pd.concat(followed, ignore_index=True)
+
+
+def joined(
+    label: str, values: Iterable[float], found: Iterable[tuple[pd.DataFrame, pd.DataFrame]]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Detections of several views or scale-spaces below each other.
+
+    Parameters
+    ----------
+    label : str
+        First column of the extrema, in which the parts differ.
+    values : iterable of float
+        Its value for each part.
+    found : iterable of (DataFrame, DataFrame)
+        What `detect_in_view` returned for each.
+
+    Returns
+    -------
+    extrema, traces : DataFrame
+        ``keypoint`` of the traces is the row in all extrema.
+
+    Examples
+    --------
+    >>> parts = [(pd.DataFrame({"y": [1, 2]}), pd.DataFrame({"keypoint": [0, 1]}))] * 2
+    >>> extrema, traces = joined("view", [0, 1], parts)
+    >>> extrema["view"].tolist(), traces["keypoint"].tolist()
+    ([0, 0, 1, 1], [0, 1, 2, 3])
+    """
+    extrema, traces, first = [], [], 0
+    for value, (table, models) in zip(values, found, strict=True):
+        labelled = table.copy(deep=False)
+        labelled.insert(0, label, value)
+        extrema.append(labelled)
+        traces.append(models.assign(keypoint=models["keypoint"] + first))
+        first += len(table)
+    return pd.concat(extrema, ignore_index=True), pd.concat(traces, ignore_index=True)
 
 
 def samples_of(window: Window, space: ScaleSpace) -> tuple[slice, slice]:

@@ -38,6 +38,18 @@ class _Way(NamedTuple):
     assumed_blur: float
 
 
+def sizes(size_from: float, size_to: float, size_count: int) -> list[float]:
+    """Sizes of blobs, evenly spaced in their logarithm; rounded, so that they can be read.
+
+    Examples
+    --------
+    >>> sizes(1.2, 3.6, 3)
+    [1.2, 2.078461, 3.6]
+    """
+    spaced: list[float] = np.geomspace(size_from, size_to, size_count).round(6).tolist()
+    return spaced
+
+
 def detect_blobs(
     blobs: Sequence[float],
     kappa: float = 2 ** (1 / 3),

@@ -2,18 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.detection.refinement import refined_table
+from keystab.detection.refinement import MOST_MODELS, refined_table, trace
 from keystab.evaluation.recall_precision import partners, recall_and_precision, with_positions
 
 if TYPE_CHECKING:
+    from keystab.scalespace.dog import ScaleSpace
     from keystab.scalespace.sampling import Sampling
+
+
+def choice_table(
+    space: ScaleSpace,
+    extrema: pd.DataFrame,
+    truth: pd.DataFrame,
+    inside: Callable[[pd.DataFrame, str], NDArray[np.bool_]],
+    max_offsets: Sequence[float],
+    most_iterations: int,
+    tolerances: Mapping[str, float] | None = None,
+) -> pd.DataFrame:
+    """What every way to refine, and every limit of it, keeps and loses (figure refinement).
+
+    Ways differ in how a step goes, ``nearest`` or ``unit_step``, and in whether it may change the
+    scale; limits are M_offset and N_interp. Paths of nearest moves serve every M_offset.
+
+    Parameters
+    ----------
+    space : ScaleSpace
+        Where the extrema were found.
+    extrema, truth, inside, tolerances
+        See `kept_and_lost`.
+    max_offsets : sequence of float
+        Values of M_offset.
+    most_iterations : int
+        Largest finite N_interp; all from 1, and no limit, are tried.
+
+    Returns
+    -------
+    DataFrame
+        ``n_spo, move, scale_moves, max_offset, max_iterations``, and what `kept_and_lost` says.
+    """
+    paths = {}
+    for scale_moves in (True, False):
+        nearest = trace(space, extrema, min(max_offsets), "nearest", scale_moves)
+        for max_offset in max_offsets:
+            paths["nearest", scale_moves, max_offset] = nearest
+            paths["unit_step", scale_moves, max_offset] = trace(
+                space, extrema, max_offset, "unit_step", scale_moves
+            )
+    rows = []
+    for (move, scale_moves, max_offset), models in paths.items():
+        for n in (*range(1, most_iterations + 1), MOST_MODELS):
+            choice = {"move": move, "scale_moves": scale_moves, "max_offset": max_offset}
+            result = kept_and_lost(
+                extrema, models, space.sampling, truth, inside, max_offset, n, tolerances
+            )
+            rows.append({"n_spo": space.sampling.n_spo, **choice, "max_iterations": n, **result})
+    return pd.DataFrame(rows)
 
 
 def kept_and_lost(

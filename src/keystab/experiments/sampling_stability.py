@@ -189,6 +189,29 @@ def long_matches(
     )
 
 
+def positions_of_matches(matches: pd.DataFrame, extrema: pd.DataFrame) -> NDArray[np.intp]:
+    """Turn rows within the table of each sampling into row positions of one table of all.
+
+    Parameters
+    ----------
+    matches : DataFrame
+        ``keypoint, n_spo, row``, from `long_matches`.
+    extrema : DataFrame
+        Those of the same samplings below each other, in ascending order of ``n_spo``.
+
+    Returns
+    -------
+    ndarray of int, shape (n_keypoints, n_samplings)
+        -1 where a keypoint is not detected.
+    """
+    if matches.empty:
+        return np.empty((0, extrema["n_spo"].nunique()), dtype=np.intp)
+    n_spo = matches["n_spo"].unique()
+    first = np.searchsorted(extrema["n_spo"].to_numpy(), n_spo)  # extrema ascend in n_spo
+    row = matches["row"].to_numpy().reshape(-1, len(n_spo))
+    return np.where(row >= 0, row + first, -1)
+
+
 def summary(
     matched: Matched, reverse: Matched, stable_above: float, unstable_below: float
 ) -> pd.DataFrame:

@@ -4,8 +4,8 @@ Snakemake reruns a rule when its command or a parameter changes, but does not se
 library behind the command. Every rule therefore carries the fingerprint of its stage as a
 parameter: it changes when the code of the stage or of any module that it imports changes,
 and stays the same under edits of comments, docstrings and layout. Of a catalogue, as the palette of
-the figures is one, only the entries count that are used. Only the standard library is used, because
-the Snakefile computes all fingerprints at every start.
+the figures and the blocks of parameters are, only the entries count that are used. Only the
+standard library is used, because the Snakefile computes all fingerprints at every start.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 PACKAGE_FOLDER = Path(__file__).parents[1]
 
-CATALOGUES = ("figures.palette",)
+CATALOGUES = ("figures.palette", "parameters")
 """Modules, without the package's name, that hold entries for others: each counts for itself."""
 
 
@@ -214,7 +214,7 @@ def _read_catalogue(module: str, package_folder: Path) -> dict[str, _Entry]:
         if isinstance(statement, (ast.Import, ast.ImportFrom, ast.If)):
             shared.append(statement)
             continue
-        if isinstance(statement, ast.FunctionDef):
+        if isinstance(statement, (ast.FunctionDef, ast.ClassDef)):
             defined = [statement.name]
         elif isinstance(statement, (ast.Assign, ast.AnnAssign)):
             places = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
@@ -222,8 +222,8 @@ def _read_catalogue(module: str, package_folder: Path) -> dict[str, _Entry]:
             defined = [node.id for node in targets if isinstance(node, ast.Name)]
         else:
             raise ValueError(
-                f"{module}, line {statement.lineno}: a catalogue holds imports, constants and "
-                "functions, nothing else"
+                f"{module}, line {statement.lineno}: a catalogue holds imports, constants, "
+                "functions and classes, nothing else"
             )
         used = frozenset(node.id for node in ast.walk(statement) if isinstance(node, ast.Name))
         if used & {"globals", "locals", "vars"}:

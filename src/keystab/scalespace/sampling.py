@@ -118,6 +118,14 @@ class Sampling:
                 f"most {_MOST_SAMPLES_PER_AXIS:,} are allowed: give a larger delta_min"
             )
 
+    @classmethod
+    def balanced(
+        cls, shape: tuple[int, int], camera_blur: float, n_spo: int, sigma_min: float, kappa: float
+    ) -> Sampling:
+        """First octave at the step of `balanced_delta`."""
+        step = balanced_delta(n_spo, kappa, sigma_min)
+        return cls(shape, camera_blur, n_spo, step, sigma_min, kappa)
+
     @property
     def first_slice(self) -> int:
         """Index s of the first slice held."""

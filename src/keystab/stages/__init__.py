@@ -1,5 +1,93 @@
 """The stages of the study, one module per rule of the workflow.
 
 Each reads files, calls the library, and writes files; ``python -m keystab.stages.NAME --help``
-says which. No scientific decision is made here.
+says which. No scientific decision is made here. The blocks of settings that stages take stand in
+`keystab.parameters`; this is what their other arguments mean. Help texts are taken from here.
+
+What several stages take
+    views : store of a set of views
+    views_digest : checksums of the store of views
+    n_spo : scales per octave of the samplings
+    samplings : tables of extrema, one per sampling
+    extrema : tables of discrete extrema
+    traces : tables of refinement traces, in the order of the extrema
+    keypoints : table of unique keypoints
+    truth : table of true extrema
+    store : stored scale-spaces
+    store_digest : checksums of the stored scale-spaces
+    table : table of results
+    sigma_min : first scale, pixels of the view
+    kappas : ratios of the two blurs
+    n_resamples : bootstrap resamples
+    name : name of the set of views, or of what the sets differ in
+    names : names, in the order of the files
+    values : value of each set
+
+Views and scale-spaces
+    reference : picture that the simulated camera looks at
+    reference_blur : blur that the picture has of itself, its pixels
+    dtype : number type in the store
+    pixels : table of pixels
+    size : side of the square that is cut out, pixels
+    delta_min : sampling steps, pixels
+    oversampling : how the view is oversampled
+    epsilon : least difference to the 26 neighbours, grey values
+
+True extrema
+    sigma_max : last scale, pixels
+    truths : tables of true extrema, one per ratio of the two blurs
+    sets : stores of the sets of views that are held against the scene
+    sets_digest : checksums of these stores
+    sweeps : sweep that each set is a member of
+    guards : width of the guard band of each set, pixels
+    features : table of features of keypoints
+    causes : table of what stable and unstable keypoints are
+    max_offsets : further values of M_offset
+    most_iterations : largest finite N_interp
+
+Comparison
+    grid : tables of extrema, one per n_spo of the grid
+    balanced_n_spo : scales per octave of the balanced samplings
+    matches : table of which detection is which keypoint
+    counts : table of counts
+    occurrence : table of which keypoint is seen where
+    summary : table of a few numbers
+    per_group : number of stable keypoints, and of unstable ones
+    panels : table of cubes
+    cubes : table of their samples
+    curve_n_spo : samplings whose curves are drawn
+    iterations : further values of N_interp
+    minimum_share : least share of the views that see a keypoint whose precision counts
+    curves : table of curves of stability
+    precision : table of precisions
+    scales : table of counts against scale
+    border : pixels left out at the border of the view
+    assumed_blur : camera blur that was assumed, pixels
+    kappa : ratio of the two blurs
+    tolerances : least difference in each variant, of grey values in [0, 1]; -1 where it was applied
+    settles_at : n_spo from which rates are averaged
+    rates : table of rates of new and lost extrema
+
+Scores
+    thresholds : table of shares below thresholds
+    roc : table of ROC curves
+    auc : table of areas under ROC curves
+    end : upper end of the scales held against the truth, over sigma-min
+    detections : table of scored detections
+    gain : table of what models gain
+
+Theory
+    profiles : table of profiles of point spread functions
+    camera_blur : camera blur, pixels
+    n_oct : octaves
+
+Claims and results
+    claims : file of claims
+    tables : tables that claims need
+    verdicts : verdicts on each picture, CSV
+    csv : table of verdicts
+    json : the same as JSON
+    markdown : the same as Markdown
+    files : files that the study ends in
+    checksums : list of their checksums
 """

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Callable
 from typing import Any
 
 import pandas as pd
 
 from keystab.evaluation.recall_precision import recall_and_precision, with_positions
-from keystab.stages._compared import compared, tolerances
+from keystab.parameters import Tolerance
+from keystab.stages._compared import Inside
 
 
-def recall_and_precision_in_octave(
-    found: pd.DataFrame,
-    truth: pd.DataFrame,
-    shape: tuple[int, int],
-    args: argparse.Namespace,
-    scale_column: str,
-) -> dict[str, Any]:
-    """Hold detections against true extrema in the range that is compared."""
-    inside = compared(args, shape)
-    finite = with_positions(found)
-    return recall_and_precision(
-        finite, truth, inside(finite, scale_column), inside(truth, "sigma"), **tolerances(args)
-    )
+def evaluation(
+    truth: pd.DataFrame, inside: Inside, tolerance: Tolerance
+) -> Callable[[pd.DataFrame, str], dict[str, Any]]:
+    """Recall, precision and errors of detections, by the scale in one of their columns."""
+    wanted = inside(truth, "sigma")
+
+    def evaluated(found: pd.DataFrame, scale_column: str) -> dict[str, Any]:
+        finite = with_positions(found)
+        counted = inside(finite, scale_column)
+        return recall_and_precision(finite, truth, counted, wanted, **vars(tolerance))
+
+    return evaluated

@@ -1,25 +1,13 @@
 """Crop the first view of several sets (figure 12 b)."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from pathlib import Path
 
-from keystab.stages import _run
+from keystab.stages._command import Store, command
 
 
-@_run.stage
-def main(argv: Sequence[str] | None = None) -> None:
+@command
+def main(views: list[Store], name: str, values: list[float], size: int, *, table: Path) -> None:
     """Read the first view of every set; write the pixels of a square in its middle."""
-    parser = _run.parser(__doc__)
-    _run.required(parser, "views", "stores of the sets", type=Path, nargs="+")
-    _run.required(parser, "views-digest", "their checksums", type=Path, nargs="+")
-    _run.required(parser, "name", "name of the value in which the sets differ")
-    _run.required(parser, "values", "the value of each set", type=float, nargs="+")
-    _run.required(parser, "size", "pixels a side", type=int)
-    _run.required(parser, "table", "table of pixels to write", type=Path)
-    args = parser.parse_args(argv)
-
     import numpy as np
     import pandas as pd
 
@@ -27,14 +15,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.io.view_store import read_view
 
     parts = []
-    for value, store, digest in zip(args.values, args.views, args.views_digest, strict=True):
-        view = read_view(store, digest)
-        top, left = (max(0, (size - args.size) // 2) for size in view.shape)
-        crop = view.image[top : top + args.size, left : left + args.size]
+    for value, store in zip(values, views, strict=True):
+        view = read_view(*store)
+        top, left = (max(0, (side - size) // 2) for side in view.shape)
+        crop = view.image[top : top + size, left : left + size]
         y, x = np.indices(crop.shape)
         columns = {"y": (y + top).ravel(), "x": (x + left).ravel(), "grey": crop.ravel()}
-        parts.append(pd.DataFrame({args.name: value, **columns}))
-    write_table(pd.concat(parts, ignore_index=True), args.table)
+        parts.append(pd.DataFrame({name: value, **columns}))
+    write_table(pd.concat(parts, ignore_index=True), table)
 
 
 if __name__ == "__main__":

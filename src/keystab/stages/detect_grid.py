@@ -1,25 +1,16 @@
 """Detect the discrete extrema of one n_spo at several sampling steps."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from pathlib import Path
 
-from keystab.stages import _run
+from keystab.parameters import Detection
+from keystab.stages._command import Store, command
 
 
-@_run.stage
-def main(argv: Sequence[str] | None = None) -> None:
+@command
+def main(
+    views: Store, n_spo: int, delta_min: list[float], detection: Detection, *, extrema: Path
+) -> None:
     """Read the view, search one scale-space per step, write one table."""
-    parser = _run.parser(__doc__)
-    _run.views_arguments(parser)
-    _run.required(parser, "n-spo", "scales per octave", type=int)
-    _run.required(parser, "delta-min", "sampling steps, pixels", type=float, nargs="+")
-    _run.detector_arguments(parser)
-    _run.required(parser, "epsilon", "least difference to the 26 neighbours", type=float)
-    _run.required(parser, "extrema", "table to write", type=Path)
-    args = parser.parse_args(argv)
-
     import pandas as pd
 
     from keystab.detection.detector import extrema_table
@@ -28,24 +19,25 @@ def main(argv: Sequence[str] | None = None) -> None:
     from keystab.io.view_store import read_view
     from keystab.scalespace.dog import scale_space
 
-    view = read_view(args.views, args.views_digest)
+    view = read_view(*views)
     tables = []
-    for delta_min in args.delta_min:
+    for step in delta_min:
         space = scale_space(
             view.image,
             view.blur,
-            n_spo=args.n_spo,
-            delta_min=delta_min,
-            sigma_min=args.sigma_min,
-            kappa=args.kappa,
-            oversampling=args.oversampling,
+            n_spo,
+            step,
+            detection.sigma_min,
+            detection.kappa,
+            detection.oversampling,
         )
-        extrema = extrema_table(space, *extrema_and_cubes(space, args.epsilon, show_progress=True))
-        extrema.insert(0, "n_spo", args.n_spo)
-        extrema.insert(1, "delta_min", delta_min)
-        tables.append(extrema)
-        print(f"{len(extrema)} extrema at delta_min = {delta_min}")
-    write_table(pd.concat(tables, ignore_index=True), args.extrema)
+        found = extrema_and_cubes(space, detection.epsilon, show_progress=True)
+        table = extrema_table(space, *found)
+        table.insert(0, "n_spo", n_spo)
+        table.insert(1, "delta_min", step)
+        tables.append(table)
+        print(f"{len(table)} extrema at delta_min = {step}")
+    write_table(pd.concat(tables, ignore_index=True), extrema)
 
 
 if __name__ == "__main__":

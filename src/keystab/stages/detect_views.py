@@ -1,59 +1,44 @@
 """Detect the discrete extrema of all views of a set at one sampling, and trace their refinement."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from pathlib import Path
 
-from keystab.stages import _run
+from keystab.parameters import DetectionInViews, RefinementPath
+from keystab.stages._command import Store, command
 
 
-@_run.stage
-def main(argv: Sequence[str] | None = None) -> None:
+@command
+def main(
+    views: Store,
+    n_spo: int,
+    detection: DetectionInViews,
+    path: RefinementPath,
+    store: Store | None = None,
+    *,
+    extrema: Path,
+    traces: Path,
+) -> None:
     """Read the views and, where they are kept, their scale-spaces; write two tables."""
-    parser = _run.parser(__doc__)
-    _run.views_arguments(parser)
-    _run.view_detector_arguments(parser)
-    _run.required(parser, "guard", "guard band of the views, pixels", type=float)
-    _run.required(parser, "epsilon", "least difference to the 26 neighbours", type=float)
-    _run.required(parser, "scale-moves", "whether a step may change the scale", type=_run.boolean)
-    _run.required(parser, "move", "nearest or unit_step")
-    _run.required(parser, "max-offset", "M_offset of unit steps", type=_run.optional(float))
-    _run.store_arguments(parser)
-    _run.required(parser, "extrema", "table of extrema to write", type=Path)
-    _run.required(parser, "traces", "table of refinement traces to write", type=Path)
-    args = parser.parse_args(argv)
-    _run.require_both_or_neither(parser, args)
-
-    import pandas as pd
-
-    from keystab.detection.view_detector import detect_in_view
+    from keystab.camera.common_field import searched_windows
+    from keystab.detection.view_detector import detect_in_view, joined
     from keystab.io.checksums import verify
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_views
-    from keystab.stages._scale_spaces import search_of_stores, searched_windows, view_detector
+    from keystab.stages._view_search import search_of_stores, view_detector
     from keystab.utils.progress import progress
 
-    views = read_views(args.views, args.views_digest)
-    if args.store is not None:
-        verify(args.store, args.store_digest)
-    windows = searched_windows(views, args.guard)
-    extrema, traces, first = [], [], 0
-    for number, view in enumerate(progress(views, len(views), f"views, n_spo {args.n_spo}")):
-        found, models = detect_in_view(
-            view.image,
-            view_detector(args, view),
-            None if args.store is None else search_of_stores(args.store, number, args.epsilon),
-            windows[number],
-        )
-        found.insert(0, "view", number)
-        models["keypoint"] += first
-        first += len(found)
-        extrema.append(found)
-        traces.append(models)
-    write_table(pd.concat(extrema, ignore_index=True), args.extrema)
-    write_table(pd.concat(traces, ignore_index=True), args.traces)
-    print(f"{first} extrema in {len(views)} views")
+    seen = read_views(*views)
+    if store is not None:
+        verify(*store)
+    windows = searched_windows(seen.specs, seen.reference_shape, detection.guard)
+    found = []
+    for number, view in enumerate(progress(seen, len(seen), f"views, n_spo {n_spo}")):
+        detector = view_detector(view, n_spo, detection, epsilon=detection.epsilon, **vars(path))
+        search = search_of_stores(store.path, number, detection.epsilon) if store else None
+        found.append(detect_in_view(view.image, detector, search, windows[number]))
+    table, models = joined("view", range(len(seen)), found)
+    write_table(table, extrema)
+    write_table(models, traces)
+    print(f"{len(table)} extrema in {len(seen)} views")
 
 
 if __name__ == "__main__":

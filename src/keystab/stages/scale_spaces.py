@@ -1,34 +1,23 @@
 """Store the scale-spaces of all views of a set at one sampling."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from pathlib import Path
-
-from keystab.stages import _run
+from keystab.parameters import ScaleSpaceOfViews
+from keystab.stages._command import Store, command
 
 
-@_run.stage
-def main(argv: Sequence[str] | None = None) -> None:
-    """Read the views, write one store per view and octave, and their checksums."""
-    parser = _run.parser(__doc__)
-    _run.views_arguments(parser)
-    _run.view_detector_arguments(parser)
-    _run.required(parser, "store", "folder of stores to write", type=Path)
-    _run.required(parser, "digest", "checksums of the stores to write", type=Path)
-    args = parser.parse_args(argv)
-
+@command
+def main(views: Store, n_spo: int, dog: ScaleSpaceOfViews, *, store: Store) -> None:
+    """Read the views, write one store per view and octave, list their checksums together."""
     from keystab.io.checksums import write_checksums
     from keystab.io.scale_space_store import write_scale_space
     from keystab.io.view_store import read_views
-    from keystab.stages._scale_spaces import store_of, view_detector
+    from keystab.stages._view_search import store_of, view_detector
 
-    views = read_views(args.views, args.views_digest)
-    for number, view in enumerate(views):
-        for octave, space in enumerate(view_detector(args, view).octaves(view.image)):
-            write_scale_space(space, store_of(args.store, number, octave))
-    write_checksums(args.store, args.digest)
-    print(f"the scale-spaces of {len(views)} views")
+    seen = read_views(*views)
+    for number, view in enumerate(seen):
+        for octave, space in enumerate(view_detector(view, n_spo, dog).octaves(view.image)):
+            write_scale_space(space, store_of(store.path, number, octave))
+    write_checksums(*store)
+    print(f"the scale-spaces of {len(seen)} views")
 
 
 if __name__ == "__main__":

@@ -1,46 +1,38 @@
 """Score features of extrema by how well they tell stable from unstable keypoints (figure 5)."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from pathlib import Path
 
-from keystab.stages import _run
+from keystab.parameters import Stable
+from keystab.stages._command import command
 
 
-@_run.stage
-def main(argv: Sequence[str] | None = None) -> None:
+@command
+def main(
+    keypoints: Path,
+    matches: Path,
+    samplings: list[Path],
+    stable: Stable,
+    n_resamples: int,
+    *,
+    features: Path,
+    thresholds: Path,
+    roc: Path,
+    auc: Path,
+) -> None:
     """Read keypoints, matches and extrema; write the tables of figure 5."""
-    parser = _run.parser(__doc__)
-    _run.required(parser, "keypoints", "table of unique keypoints", type=Path)
-    _run.required(parser, "matches", "table of matches", type=Path)
-    _run.required(parser, "samplings", "extrema of the samplings", type=Path, nargs="+")
-    _run.label_arguments(parser)
-    _run.required(parser, "n-resamples", "bootstrap resamples", type=int)
-    _run.required(parser, "features", "table of features to write", type=Path)
-    _run.required(parser, "thresholds", "table of shares below thresholds to write", type=Path)
-    _run.required(parser, "roc", "table of ROC curves to write", type=Path)
-    _run.required(parser, "auc", "table of areas under the curves to write", type=Path)
-    args = parser.parse_args(argv)
-
     from keystab.experiments.feature_scores import score_features
+    from keystab.experiments.sampling_stability import positions_of_matches
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._inputs import positions_of_matches, read_extrema, read_keypoints
+    from keystab.stages._tables import read_extrema, read_keypoints
 
-    keypoints = read_keypoints(args.keypoints, ["keypoint", "stability"])
-    extrema = read_extrema(args.samplings)
-    scores = score_features(
-        keypoints,
-        extrema,
-        positions_of_matches(read_table(args.matches), extrema),
-        args.stable_above,
-        args.unstable_below,
-        args.n_resamples,
-    )
-    write_table(scores.features, args.features)
-    write_table(scores.thresholds, args.thresholds)
-    write_table(scores.roc, args.roc)
-    write_table(scores.auc, args.auc)
+    unique = read_keypoints(keypoints, ["keypoint", "stability"])
+    extrema = read_extrema(samplings)
+    found = positions_of_matches(read_table(matches), extrema)
+    scores = score_features(unique, extrema, found, **vars(stable), n_resamples=n_resamples)
+    write_table(scores.features, features)
+    write_table(scores.thresholds, thresholds)
+    write_table(scores.roc, roc)
+    write_table(scores.auc, auc)
     print(scores.auc.to_string(index=False))
 
 

@@ -19,7 +19,7 @@ from keystab.study.verdicts import UNTESTED, VERDICTS
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Source", "missing", "read_report", "side_by_side", "sources", "to_markdown"]
+__all__ = ["Source", "finished", "missing", "read_report", "side_by_side", "sources", "to_markdown"]
 
 #: What the table says of each picture, after the picture's name and an underscore.
 OF_PICTURE = ("verdict", "value", "interval")
@@ -93,6 +93,23 @@ def missing(found: Sequence[Source], made: str) -> list[str]:
         for source in found
         if source.report != made and not Path(source.report).is_file()
     ]
+
+
+def finished(base: Path | str, overlays: Sequence[Path | str], made: str) -> list[Source]:
+    """Reports of studies of several pictures, all of them there or made in this run.
+
+    Each picture has settings of its own, and so a run of its own.
+
+    Raises
+    ------
+    InputError
+        As `sources`, and if a report is `missing`.
+    """
+    found = sources(base, overlays)
+    problems = missing(found, made)
+    if problems:
+        raise InputError("\n".join(problems))
+    return found
 
 
 def read_report(path: Path | str) -> pd.DataFrame:

@@ -13,22 +13,26 @@ from pathlib import Path
 from keystab.camera.view_sets import assumed_blur, expanded, per_view
 from keystab.camera.views import effective_blur
 from keystab.errors import InputError
-from keystab.study.picture_checks import Settings, kept_n_spo, picture_problems, still_blur
+from keystab.study.picture_checks import Settings, picture_problems, still_blur
+from keystab.study.plan import FIGURES, kept_n_spo
 from keystab.study.settings import refuse
 
 NEEDED_SETS = ("still", "examples")
 """Sets of views that the figures are made from."""
 
-SEARCHED_SETS = ("translations", "zooms", "rotations", "shipped", "blur_errors")
+ONCE_SEARCHED = {"shipped": "figure 7", "blur_errors": "figure S2"}
+"""Sets of views that are searched at one sampling, and what is made of them."""
+
+SEARCHED_SETS = (
+    *(about.views for about in FIGURES.values() if about.views and not about.swept),
+    *ONCE_SEARCHED,
+)
 """Sets of views that are searched for keypoints."""
 
-ONCE_SEARCHED = {"shipped": "figure 7", "blur_errors": "figure S2"}
-"""Sets of them that are searched at one sampling, and what is made of them."""
-
 SWEPT_SETS = {
-    "aliasing": ("figure 10", "blur"),
-    "unknown_blur": ("figure 11", "blur_spread"),
-    "noise": ("figure 12", "noise"),
+    about.views: (name.replace("fig", "figure "), about.swept)
+    for name, about in FIGURES.items()
+    if about.swept
 }
 """Sweeps of sets of views that are searched: what is made of them, and what they differ in."""
 

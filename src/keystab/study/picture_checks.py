@@ -18,35 +18,11 @@ from keystab.errors import InputError
 from keystab.io.pictures import picture_shape
 from keystab.matching.common_range import common_scales
 from keystab.scalespace.sampling import Sampling, balanced_delta
+from keystab.study.plan import kept_n_spo
+from keystab.study.scenes import further_pictures
 from keystab.utils.memory import in_words
 
 Settings = Mapping[str, Any]
-
-
-def further_pictures(settings: Settings, folder: Path | str = ".") -> list[str]:
-    """Names of the pictures of figure predictors that are not the reference.
-
-    Left out once, a picture that counts twice would have been learnt from.
-
-    Parameters
-    ----------
-    settings : dict
-        Complete settings.
-    folder : path
-        Folder that relative paths in the settings start from.
-
-    Examples
-    --------
-    >>> pictures = {"a": {"path": "a.png"}, "b": {"path": "./b.png"}}
-    >>> further_pictures({"reference": "b.png", "predictors": {"pictures": pictures}})
-    ['a']
-    """
-    own = Path(folder, settings["reference"]).resolve()
-    return [
-        name
-        for name, picture in settings["predictors"]["pictures"].items()
-        if Path(folder, picture["path"]).resolve() != own
-    ]
 
 
 def further_picture_problems(settings: Settings, folder: Path) -> list[str]:
@@ -272,20 +248,6 @@ def samplings(settings: Settings, shape: tuple[int, int]) -> dict[str, list[Samp
         block: [Sampling(shape, blur, n, delta_min, sigma_min, kappa) for n, delta_min in members]
         for block, members in pairs.items()
     }
-
-
-def kept_n_spo(settings: Settings) -> list[int]:
-    """Scales per octave of the samplings whose scale-space is written to a store.
-
-    Examples
-    --------
-    >>> kept_n_spo({"keep_scale_spaces": True, "samplings": {"n_spo": [3, 15]}})
-    [3, 15]
-    >>> kept_n_spo({"keep_scale_spaces": False, "samplings": {"n_spo": [3, 15]}})
-    []
-    """
-    kept = settings["keep_scale_spaces"]
-    return list(settings["samplings"]["n_spo"]) if kept is True else list(kept or [])
 
 
 def _free_bytes(folder: Path) -> int:

@@ -15,19 +15,19 @@ from keystab.io.tables import read_table, write_table
 from keystab.prediction.features import DIRECTIONS
 from keystab.stages import (
     detect,
-    find_truth,
-    judge_grid,
-    judge_kappas,
-    judge_keypoints,
-    judge_refinement,
-    judge_samplings,
-    judge_views,
+    evaluate_grid,
+    evaluate_kappas,
+    evaluate_keypoints,
+    evaluate_refinement,
+    evaluate_samplings,
+    evaluate_views,
+    find_true_extrema,
     simulate,
 )
 
 KAPPA = 2 ** (1 / 3)
 SHAPE = (60, 70)
-STILL = {"set": "still", "shift-y": "0.0", "shift-x": "0.0", "guard": "0"}
+STILL = {"name": "still", "shift-y": "0.0", "shift-x": "0.0", "guard": "0"}
 RANGE = ["--sigma-min", "1.1", "--border", "3.0", "--first-scale", "1.25", "--last-scale", "2.0"]
 SAME = ["--space-tolerance", "1.0", "--scale-ratio", "1.4142135623730951"]
 ACCEPTED = ["--max-offset", "0.6", "--max-iterations", "2"]
@@ -49,13 +49,14 @@ def take_views(folder: Path, name: str, **changes: str) -> list[str]:
         "width": "None",
         "whole": "False",
         "dtype": "float64",
-        "store": str(folder / name),
-        "digest": str(folder / f"{name}.sha256"),
+        "views": str(folder / name),
+        "views-digest": str(folder / f"{name}.sha256"),
     }
+    options |= {"name": name}
     options |= {key.replace("_", "-"): value for key, value in changes.items()}
     words = [text for key, value in options.items() for text in (f"--{key}", *value.split())]
     assert simulate.main(words) == 0
-    return [options["store"], options["digest"]]
+    return [options["views"], options["views-digest"]]
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +122,7 @@ def test_every_node_of_the_grid_is_judged_by_itself(seen, tmp_path):
     out = tmp_path / "grid.csv"
     grids = [str(tmp_path / f"grid_n{n_spo}.parquet") for n_spo in (3, 5)]
     given = [*still(seen), "--truth", str(tmp_path / "truth.parquet"), "--extrema", *grids]
-    assert judge_grid.main([*given, *RANGE, *SAME, "--table", str(out)]) == 0
+    assert evaluate_grid.main([*given, *RANGE, *SAME, "--table", str(out)]) == 0
     table = read_table(out)
     assert list(zip(table["n_spo"], table["delta_min"], strict=True)) == list(nodes)
     assert table["recall"].tolist() == [0.5, 1.0, 1.0]
@@ -154,7 +155,7 @@ def test_every_ratio_is_held_against_its_own_truth(seen, tmp_path):
         *("--kappas", *map(str, truths), "--extrema", str(tmp_path / "extrema.parquet")),
         *("--traces", str(tmp_path / "traces.parquet"), *RANGE, *SAME, *ACCEPTED),
     ]
-    assert judge_kappas.main([*arguments, "--table", str(out)]) == 0
+    assert evaluate_kappas.main([*arguments, "--table", str(out)]) == 0
     table = read_table(out)
     assert table["kappa"].tolist() == [1.1, 1.1, 1.4, 1.4]
     assert table["detections"].tolist() == ["discrete", "refined"] * 2
@@ -189,7 +190,7 @@ def test_causes_are_counted_within_their_groups_and_features_are_asked_for_truth
         *("--stable-above", "0.8", "--unstable-below", "0.2", "--n-resamples", "100"),
         *("--causes", str(tmp_path / "causes.csv"), "--auc", str(tmp_path / "auc.csv")),
     ]
-    assert judge_keypoints.main([*arguments, *RANGE, *SAME]) == 0
+    assert evaluate_keypoints.main([*arguments, *RANGE, *SAME]) == 0
     causes = read_table(tmp_path / "causes.csv")
     counted = causes.pivot(index="group", columns="cause", values="n")[list(CAUSES)]
     assert counted.loc["stable"].tolist() == [3, 1, 0, 0, 0]
@@ -213,7 +214,7 @@ def test_causes_are_counted_within_their_groups_and_features_are_asked_for_truth
 
 def test_views_are_held_against_the_scene_in_its_own_frame(seen, tmp_path):
     guard, shift = 4, (2, -3)
-    views = take_views(seen, "moved", set="moved", shift_y="0 2", shift_x="0 -3", guard=str(guard))
+    views = take_views(seen, "moved", shift_y="0 2", shift_x="0 -3", guard=str(guard))
     truth = known()
     write_table(truth, tmp_path / "scene.parquet")
     first = truth.assign(y=truth["y"] + guard, x=truth["x"] + guard)
@@ -230,7 +231,7 @@ def test_views_are_held_against_the_scene_in_its_own_frame(seen, tmp_path):
         *("--traces", str(tmp_path / "traces.parquet"), "--sweeps", "noise", "--values", "0.03"),
         *("--n-spo", "15", "--guards", str(guard), *RANGE, *SAME, *ACCEPTED),
     ]  # fmt: skip
-    assert judge_views.main([*arguments, "--table", str(out)]) == 0
+    assert evaluate_views.main([*arguments, "--table", str(out)]) == 0
     table = read_table(out)
     assert table["detections"].tolist() == ["discrete", "refined"]
     assert (table["sweep"] == "noise").all() and (table["value"] == 0.03).all()
@@ -249,11 +250,11 @@ def detected(seen) -> Path:
     """The true extrema of the view, and its detections at two samplings."""
     arguments = [*still(seen), "--sigma-min", "1.1", "--kappa", str(KAPPA)]
     arguments += ["--sigma-max", "2.6", "--table", str(seen / "truth.parquet")]
-    assert find_truth.main(arguments) == 0
+    assert find_true_extrema.main(arguments) == 0
     for n_spo in (3, 9):
         arguments = [
             *(*still(seen), "--n-spo", str(n_spo), *DETECTOR, "--epsilon", "0.0"),
-            *("--scale-moves", "True", "--move", "nearest", "--max-offset", "None"),
+            *("--scale-moves", "True", "--move", "nearest", "--max-offset", "0.5"),
             *("--extrema", str(seen / f"n{n_spo}.parquet")),
             *("--traces", str(seen / f"traces_n{n_spo}.parquet")),
         ]
@@ -288,7 +289,7 @@ def test_finer_and_refined_detections_lie_nearer_to_the_truth(detected, tmp_path
     traces = ["--traces", *(str(detected / f"traces_n{n}.parquet") for n in (3, 9))]
     out = tmp_path / "samplings.csv"
     arguments = [*judging(detected), *traces, *ACCEPTED, "--table", str(out)]
-    assert judge_samplings.main(arguments) == 0
+    assert evaluate_samplings.main(arguments) == 0
     table = read_table(out)
     labels = ["n_spo", "detections"]
     assert table[labels].values.tolist() == [
@@ -312,7 +313,7 @@ def test_finer_and_refined_detections_lie_nearer_to_the_truth(detected, tmp_path
 def test_every_way_to_refine_keeps_or_loses_what_there_is(detected, tmp_path):
     out = tmp_path / "refinement.csv"
     limits = ["--max-offsets", "0.5", "0.6", "inf", "--most-iterations", "3"]
-    assert judge_refinement.main([*judging(detected), *limits, "--table", str(out)]) == 0
+    assert evaluate_refinement.main([*judging(detected), *limits, "--table", str(out)]) == 0
     table = read_table(out)
     ways = ["n_spo", "move", "scale_moves", "max_offset"]
     assert (
