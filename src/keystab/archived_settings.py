@@ -8,42 +8,59 @@ those of the archive's own record, which were checked, and paths must stay withi
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
 from keystab.errors import InputError
 from keystab.settings import Settings, checked, merge, read_yaml
 from keystab.unpacking import Unpacked
+from keystab.workflow import settings_digest
 
-__all__ = ["FILE", "plain_settings", "place_settings"]
+__all__ = ["FILE", "ArchivedSettings", "place_settings", "plain_settings", "settings_of"]
 
 FILE = "archived_settings.yaml"
 """Where the settings of an archive are put in a copy of the project, below its folder."""
 
-_MOST_BYTES, _MOST_DEPTH = 100_000, 20
-_OVERLAY = re.compile(r"settings/[0-9]+-[^/]+")
+_MOST_BYTES, _MOST_DEPTH, _MOST_VALUES = 100_000, 20, 5000
+_OVERLAY = re.compile(r"settings/[0-9]+-\w[^/]*")
 _TEXT = re.compile(r"[\w./+-][\w ./+-]*")
 _OPTION = re.compile(r"(^| )-")
 
 
-def place_settings(archive: Unpacked, project: Path, scratch: Path) -> list[str]:
-    """Put the settings of an archive, and pictures that they name, into a copy of the project.
+class ArchivedSettings(NamedTuple):
+    """Settings of an archive.
+
+    Parameters
+    ----------
+    given : dict
+        What is laid over the project's own; folders are those of the archive.
+    digest : str
+        That of all settings, see `keystab.workflow.settings_digest`.
+    pictures : list of str
+        Paths of files that they name.
+    """
+
+    given: Settings
+    digest: str
+    pictures: list[str]
+
+
+def settings_of(archive: Unpacked, project: Path) -> ArchivedSettings:
+    """Read what the settings of an archive say, and what follows for all settings.
 
     Parameters
     ----------
     archive : Unpacked
     project : path
         The project that is here, whose schema and settings the archive's are laid over.
-    scratch : path
-        The copy, in which all files are written.
 
     Returns
     -------
-    list of str
-        Overlays of the run in the copy: none, or `FILE`.
+    ArchivedSettings
 
     Raises
     ------
@@ -59,18 +76,53 @@ def place_settings(archive: Unpacked, project: Path, scratch: Path) -> list[str]
     schema = yaml.safe_load(
         (project / "workflow/schemas/config.schema.yaml").read_text(encoding="utf-8")
     )
-    folders = {key: getattr(archive.about, key) for key in ("results", "figures", "logs")}
-    needed = bool(given) or any(own.get(key, key) != folder for key, folder in folders.items())
-    merge(given, folders)
+    for key in ("results", "figures", "logs"):
+        folder = getattr(archive.about, key)
+        if given.get(key, folder) != folder:
+            raise InputError(f"settings say {key}: {str(given[key])[:80]!a}, archive.json another")
+        if own.get(key, key) != folder:
+            given[key] = folder
     merge(own, given)
-    complete = checked(own, schema)
-    for place, path in _paths(complete):
+    try:
+        complete = checked(own, schema)
+    except InputError as error:
+        first, *more = str(error).split("\n")
+        told = f", and {len(more)} more" if more else ""
+        raise InputError(f"settings: {first[:200]}{told}") from None
+    paths = list(_paths(complete))
+    for place, path in paths:
         _check_path(place, path)
+    return ArchivedSettings(given, settings_digest(complete), [path for _, path in paths])
+
+
+def place_settings(archive: Unpacked, project: Path, scratch: Path) -> list[str]:
+    """Put the settings of an archive, and pictures that they name, into a copy of the project.
+
+    Parameters
+    ----------
+    archive : Unpacked
+    project : path
+        The project that is here.
+    scratch : path
+        The copy, in which all files are written.
+
+    Returns
+    -------
+    list of str
+        Overlays of the run in the copy: none, or `FILE`.
+
+    Raises
+    ------
+    InputError
+        As `settings_of`.
+    """
+    given, _, pictures = settings_of(archive, project)
+    for path in pictures:
         source, target = archive.folder / path, scratch / path
         if source.is_file() and not target.exists() and path.startswith("config/images/"):
             target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(source.read_bytes())
-    if not needed:
+            shutil.copyfile(source, target)
+    if not given:
         return []
     (scratch / FILE).write_text(yaml.safe_dump(given, sort_keys=False), encoding="utf-8")
     return [FILE]
@@ -89,8 +141,8 @@ def plain_settings(data: bytes, name: str) -> Settings:
     Raises
     ------
     InputError
-        In one line, if it is too long or too deep, refers to parts of itself, says a name twice,
-        is no block of settings, or holds text that settings never hold.
+        In one line, if it is too long or too deep, has tags, refers to parts of itself, is no
+        block of settings, or holds text that settings never hold.
 
     Examples
     --------
@@ -105,17 +157,22 @@ def plain_settings(data: bytes, name: str) -> Settings:
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
         text = data.decode("utf-8")
-        depth = 0
+        depth, values = 0, 0
         for event in yaml.parse(text, Loader=loader):
-            if isinstance(event, yaml.AliasEvent):
+            if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
                 raise InputError(f"{name}: refers to parts of itself; settings are written out")
+            if getattr(event, "tag", None):
+                raise InputError(f"{name}: has tags; settings are not plain YAML with them")
+            values += isinstance(event, yaml.ScalarEvent)
             depth += isinstance(event, yaml.CollectionStartEvent)
             depth -= isinstance(event, yaml.CollectionEndEvent)
-            if depth > _MOST_DEPTH:
-                raise InputError(f"{name}: is nested too deeply for settings")
+            if depth > _MOST_DEPTH or values > _MOST_VALUES:
+                raise InputError(f"{name}: too many values, or nested too deeply for settings")
         given = yaml.load(text, Loader=loader) or {}
-    except (ValueError, RecursionError, yaml.YAMLError):
-        raise InputError(f"{name}: is not YAML in UTF-8") from None
+    except InputError:
+        raise
+    except (ValueError, ArithmeticError, RecursionError, yaml.YAMLError):
+        raise InputError(f"{name}: is not plain YAML in UTF-8") from None
     if not isinstance(given, dict):
         raise InputError(f"{name}: holds no settings")
     for text in _texts(given):

@@ -13,7 +13,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -22,6 +22,8 @@ from keystab.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from keystab.unpacking import Unpacked
 
 __all__ = ["main"]
 
@@ -219,8 +221,7 @@ def verify(args: argparse.Namespace) -> int:
     """Check an archive, or the results that are here; recompute figures on request."""
     from keystab import verification
     from keystab.checks import integer, number
-    from keystab.provenance import file_digest
-    from keystab.unpacking import require_archive
+    from keystab.unpacking import committed, unpacked
     from keystab.workflow import Study, find_project
 
     integer("cores", args.cores, least=1)  # Snakemake waits for ever for the first of none
@@ -231,36 +232,40 @@ def verify(args: argparse.Namespace) -> int:
     if args.archive is None:
         print(f"results of {project}")
         checks, sound = verification.check_here(Study(project, args.configfile))
+        print(verification.report(checks), flush=True)
+        if args.recompute:  # the committed reference is compared with, whatever else is here
+            reference = project / "results/reference"
+            own = verification.check_reference_itself(reference)
+            if own.problems:
+                print(verification.report([own]))
+            sound = not own.problems and _recompute(args, committed(reference), project) and sound
     else:
-        require_archive(args.archive)
-        print(f"{args.archive}: sha256 {file_digest(args.archive)}")
-        checks, sound = verification.check_archive(args.archive, project)
-    print(verification.report(checks), flush=True)
-    if args.recompute and (sound or args.archive is None):
-        sound = _recompute(args, project) and sound
-    elif args.recompute:
-        print("nothing is recomputed: the archive is not what a run of the study packs")
+        # Taken apart once: what is recomputed is what was checked.
+        with unpacked(args.archive) as held:
+            try:
+                checks, sound = verification.check_archive(held, project)
+            except InputError as error:
+                raise InputError(f"{args.archive}: {error}") from None
+            print(
+                f"{args.archive}: sha256 {held.digest}\n{verification.report(checks)}", flush=True
+            )
+            if args.recompute and sound:
+                sound = _recompute(args, held, project)
+            elif args.recompute:
+                print("nothing is recomputed: the archive is not what a run of the study packs")
     verdict = "verified" if sound else "NOT verified: see the lines marked FAILED"
     print(f"{verdict} ({time.monotonic() - start:.0f} s)")
     return 0 if sound else 1
 
 
-def _recompute(args: argparse.Namespace, project: Path) -> bool:
+def _recompute(args: argparse.Namespace, held: Unpacked, project: Path) -> bool:
     """Compute figures again with the code that is here; whether the numbers are the same."""
     from keystab import recomputation, verification
-    from keystab.unpacking import committed, unpacked
 
-    reference = project / "results/reference"
-    if args.archive is None:  # the committed reference is compared with, whatever else is here
-        own = verification.check_reference_itself(reference)
-        if own.problems:
-            print(verification.report([own]))
-            return False
-    with unpacked(args.archive) if args.archive else nullcontext(committed(reference)) as held:
-        print(f"recomputing {' '.join(args.recompute)} with the code of {project}", flush=True)
-        checks, same = recomputation.recompute(
-            held, project, args.recompute, args.cores, args.rtol, args.atol
-        )
+    print(f"recomputing {' '.join(args.recompute)} with the code of {project}", flush=True)
+    checks, same = recomputation.recompute(
+        held, project, args.recompute, args.cores, args.rtol, args.atol
+    )
     print(f"recomputed {' '.join(args.recompute)}\n{verification.report(checks)}")
     return same
 

@@ -11,7 +11,7 @@ from keystab.archived_settings import place_settings
 from keystab.errors import InputError
 from keystab.provenance import file_digest
 from keystab.records import Record, read_records
-from keystab.result_checks import Check, alike, compare_tables, left_out_digests, verdicts_in
+from keystab.result_checks import Check, alike, compare_tables, compare_verdicts, left_out_digests
 from keystab.run_description import About
 from keystab.seals import read_sums
 from keystab.unpacking import Unpacked
@@ -64,7 +64,7 @@ def recompute(
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
         copy_workflow(project, scratch)
-        study = Study(scratch, place_settings(held, project, scratch))
+        study = Study(scratch, place_settings(held, project, scratch), home=scratch)
         drawn = [
             f"{study.figures}/{target}.{kind}" for target in targets for kind in ("pdf", "png")
         ]
@@ -85,7 +85,8 @@ def recompute(
             _compare_figures(source, study, records, about),
         ]
         if everything:
-            checks.append(_compare_verdicts(source, scratch / study.results, about))
+            inside = source if (source / "claims.csv").is_file() else source / about.results
+            checks.append(compare_verdicts(inside, scratch / study.results))
         checks.append(_compare_left_out(source, study, records, about))
     return checks, not any(check.problems for check in checks)
 
@@ -106,19 +107,6 @@ def _compare_figures(
     words = f"{len(paths) - len(told)} of {len(paths)} the same to the last bit"
     same_machine = alike(about, study.lock_digest)
     return Check("figures", words, told if same_machine else [], [] if same_machine else told)
-
-
-def _compare_verdicts(source: Path, found: Path, about: About) -> Check:
-    """Compare the verdicts on claims."""
-    path = source / "claims.csv"
-    path = path if path.is_file() else source / about.results / "claims.csv"
-    before, after = verdicts_in(path), verdicts_in(found / "claims.csv")
-    problems = [
-        f"{name}: {before.get(name, 'no verdict')} became {after.get(name, 'no verdict')}"
-        for name in sorted(before.keys() | after.keys())
-        if before.get(name) != after.get(name)
-    ]
-    return Check("claims", f"{len(before)} verdicts the same", problems)
 
 
 def _compare_left_out(

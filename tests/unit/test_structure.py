@@ -29,7 +29,8 @@ def imported(path: Path) -> set[str]:
 
 
 LAST = ("records", "workflow", "provenance", "differences", "crate", "archive")
-LAST += ("verification", "recomputation")
+LAST += ("run_description", "unpacking", "bare_code", "archived_settings", "archive_contents")
+LAST += ("result_checks", "verification", "recomputation")
 IMPORTS = {name: imported(path) for name, path in FILES.items()}
 
 

@@ -60,7 +60,8 @@ def digests(held: Unpacked) -> list[str]:
 
 def found(path: Path, project: Path) -> dict[str, list[str]]:
     """Problems of an archive by the name of the check."""
-    checks, sound = verification.check_archive(path, project)
+    with unpacked(path) as held:
+        checks, sound = verification.check_archive(held, project)
     problems = {check.what: check.problems for check in checks if check.problems}
     assert sound == (not problems)
     return problems
@@ -223,20 +224,20 @@ def test_figures_of_other_code_are_named(packed, ran, monkeypatch):
 def test_what_is_no_archive_is_refused(content, clone, tmp_path, packed):
     path = tmp_path / "a.zip"
     path.write_bytes(packed.read_bytes()[:5000] if content is None else content)
-    with pytest.raises(InputError, match="a.zip: not a whole zip file"):
-        verification.check_archive(path, clone)
+    with pytest.raises(InputError, match="a.zip: not a whole zip file"), unpacked(path):
+        pass
 
 
 def test_archives_that_write_elsewhere_are_refused(clone, tmp_path):
     path = tmp_path / "a.zip"
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("../escaped.txt", "")
-    with pytest.raises(InputError, match="leads out of its folder"):
-        verification.check_archive(path, clone)
+    with pytest.raises(InputError, match="leads out of its folder"), unpacked(path):
+        pass
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("a.txt", "")
-    with pytest.raises(InputError, match="no archive of this study"):
-        verification.check_archive(path, clone)
+    with pytest.raises(InputError, match="no archive of this study"), unpacked(path):
+        pass
     assert not (tmp_path.parent / "escaped.txt").exists()
 
 
