@@ -9,23 +9,40 @@ from __future__ import annotations
 
 import re
 import shutil
+import struct
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import yaml
 
 from keystab.errors import InputError
 from keystab.settings import Settings, checked, merge, read_yaml
 from keystab.unpacking import Unpacked
+from keystab.view_sets import expanded
 from keystab.workflow import settings_digest
 
-__all__ = ["FILE", "ArchivedSettings", "place_settings", "plain_settings", "settings_of"]
+__all__ = [
+    "FILE",
+    "ArchivedSettings",
+    "differing",
+    "place_settings",
+    "plain_settings",
+    "settings_of",
+]
 
 FILE = "archived_settings.yaml"
 """Where the settings of an archive are put in a copy of the project, below its folder."""
 
-_MOST_BYTES, _MOST_DEPTH, _MOST_VALUES = 100_000, 20, 5000
+_MOST_BYTES, _MOST_DEPTH, _MOST_VALUES = 100_000, 20, 2000
+_MOST_SETS, _MOST_VIEWS, _MOST_PAGES = 200, 20_000, 20
+"""The study's own settings have 500 values, and 1000 views in 40 sets."""
+
+_MOST_BYTES_OF_TIFF = 1 << 40
+_TIFF = {b"II*\0": ("<L", "<H", 12), b"MM\0*": (">L", ">H", 12)}
+_TIFF |= {b"II+\0": ("<Q", "<Q", 20), b"MM\0+": (">Q", ">Q", 20)}
+"""First bytes of a TIFF: how it writes a place, a number of entries, and the size of an entry."""
+
 _OVERLAY = re.compile(r"settings/[0-9]+-\w[^/]*")
 _TEXT = re.compile(r"[\w./+-][\w ./+-]*")
 _OPTION = re.compile(r"(^| )-")
@@ -38,15 +55,20 @@ class ArchivedSettings(NamedTuple):
     ----------
     given : dict
         What is laid over the project's own; folders are those of the archive.
-    digest : str
-        That of all settings, see `keystab.workflow.settings_digest`.
+    complete : dict
+        All settings.
     pictures : list of str
         Paths of files that they name.
     """
 
     given: Settings
-    digest: str
+    complete: Settings
     pictures: list[str]
+
+    @property
+    def digest(self) -> str:
+        """That of all settings, see `keystab.workflow.settings_digest`."""
+        return settings_digest(self.complete)
 
 
 def settings_of(archive: Unpacked, project: Path) -> ArchivedSettings:
@@ -89,10 +111,33 @@ def settings_of(archive: Unpacked, project: Path) -> ArchivedSettings:
         first, *more = str(error).split("\n")
         told = f", and {len(more)} more" if more else ""
         raise InputError(f"settings: {first[:200]}{told}") from None
+    sets = expanded(complete.get("sets", {}))
+    views = sum(it.get("n_views", 1) for it in sets.values())
+    if len(sets) > _MOST_SETS or views > _MOST_VIEWS:
+        raise InputError(
+            f"settings: {len(sets)} sets of {views} views, those of an archive have at most "
+            f"{_MOST_SETS} of {_MOST_VIEWS}"
+        )
     paths = list(_paths(complete))
     for place, path in paths:
         _check_path(place, path)
-    return ArchivedSettings(given, settings_digest(complete), [path for _, path in paths])
+    return ArchivedSettings(given, complete, [path for _, path in paths])
+
+
+def differing(one: Any, other: Any, place: str = "") -> Iterator[str]:
+    """Names of settings that are not the same in two blocks of them.
+
+    Examples
+    --------
+    >>> list(differing({"a": {"b": 1, "c": 2}}, {"a": {"b": 1}, "d": 3}))
+    ['a.c', 'd']
+    """
+    if not (isinstance(one, dict) and isinstance(other, dict)):
+        if one != other:
+            yield place
+        return
+    for key in sorted({*one, *other}, key=str):
+        yield from differing(one.get(key), other.get(key), f"{place}.{key}" if place else str(key))
 
 
 def place_settings(archive: Unpacked, project: Path, scratch: Path) -> list[str]:
@@ -120,6 +165,7 @@ def place_settings(archive: Unpacked, project: Path, scratch: Path) -> list[str]
     for path in pictures:
         source, target = archive.folder / path, scratch / path
         if source.is_file() and not target.exists() and path.startswith("config/images/"):
+            _check_picture(source, path)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
     if not given:
@@ -211,3 +257,32 @@ def _check_path(place: str, path: str) -> None:
             f"{place} is {path[:80]!a}, a file outside the archive: what was made from it cannot "
             "be checked; the picture belongs into config/images before the run is packed"
         )
+
+
+def _check_picture(source: Path, path: str) -> None:
+    """Refuse what a decoder would run or read for long: programs, and endless lists of pages."""
+    with source.open("rb") as file:
+        start = file.read(8)
+        if start.startswith((b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")):
+            return
+        if start[:4] in _TIFF and _pages(file, *_TIFF[start[:4]]) <= _MOST_PAGES:
+            return
+    raise InputError(f"{path}: no PNG, JPEG or TIFF that holds one picture")
+
+
+def _pages(file: IO[bytes], place: str, number: str, size: int) -> int:
+    """Count the pages of a TIFF, up to one more than are allowed."""
+
+    def read(kind: str) -> int:
+        data = file.read(struct.calcsize(kind))
+        return struct.unpack(kind, data)[0] if len(data) == struct.calcsize(kind) else 0
+
+    file.seek(struct.calcsize(place))  # behind the first bytes, which are as long as a place
+    found, page = 0, read(place)
+    while page and found <= _MOST_PAGES:
+        file.seek(min(page, _MOST_BYTES_OF_TIFF))
+        entries = read(number)
+        file.seek(min(size * entries, _MOST_BYTES_OF_TIFF), 1)
+        page = read(place)
+        found += 1
+    return found

@@ -51,6 +51,7 @@ FINAL = "final.sha256"
 
 _SUM = re.compile("([0-9a-f]{64})  ([^\n]+)\n")
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+_MOST_NAMED = 5
 _MOST_BYTES_OF_LINE, _MOST_ROWS_OF_JOIN = 4000, 5_000_000
 _VERDICTS = ("claims.csv", "claims.json", "claims.md")
 _GREY_LEVELS, _SHARE_OF_PIXELS = 32, 0.005
@@ -387,7 +388,7 @@ def check_columns(run: Run) -> Check:
 # What another run says
 
 
-def check_reference(run: Run, reference: Path, lock: str) -> list[Check]:
+def check_reference(run: Run, reference: Path, lock: str, other: Sequence[str] = ()) -> list[Check]:
     """Compare tables, verdicts and figures with the committed reference.
 
     Parameters
@@ -397,6 +398,8 @@ def check_reference(run: Run, reference: Path, lock: str) -> list[Check]:
         Folder that `keystab.archive.publish` wrote.
     lock : str
         SHA-256 of the lock file here.
+    other : sequence of str, optional
+        Names of settings that are not those of the reference, as far as they are known.
 
     Returns
     -------
@@ -408,7 +411,9 @@ def check_reference(run: Run, reference: Path, lock: str) -> list[Check]:
     except InputError as error:
         return [Check("results/reference", f"not compared: {str(error).split('; ')[0]}")]
     if about.settings != run.about.settings:
-        return [Check("results/reference", "not compared: it was made with other settings")]
+        named = ", ".join(other[:_MOST_NAMED]) + (" and more" if len(other) > _MOST_NAMED else "")
+        told = "not compared: it was made with other settings" + (f": {named}" if named else "")
+        return [Check("results/reference", told)]
     exact = alike(about, run.about.lock, run.about.arithmetic)
     return [
         compare_tables(

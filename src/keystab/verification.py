@@ -8,6 +8,7 @@ REPRODUCING.md.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 import shutil
@@ -18,7 +19,7 @@ from pathlib import Path
 
 from keystab.archive import about_study, is_final
 from keystab.archive_contents import check_contents, check_sources
-from keystab.archived_settings import place_settings, settings_of
+from keystab.archived_settings import differing, place_settings, settings_of
 from keystab.errors import InputError
 from keystab.provenance import file_digest
 from keystab.records import Record, place_records, read_foreign_records, read_records, upstream
@@ -37,14 +38,15 @@ from keystab.result_checks import (
 )
 from keystab.run_description import ABOUT, LEFT_OUT, SUMS
 from keystab.seals import verify as verify_seal
-from keystab.unpacking import Unpacked
+from keystab.settings import Settings
+from keystab.unpacking import Unpacked, committed
 from keystab.workflow import Output, Study
 
 __all__ = ["check_archive", "check_here", "check_reference_itself", "copy_workflow", "report"]
 
-_MOST_NAMED = 10
+_MOST_NAMED, _MOST_LETTERS = 10, 400
 _WORKFLOW = ("Snakefile", "environment.lock", "workflow", "profiles", "config")
-_MOST_SECONDS = 120.0
+_MOST_SECONDS = 60.0
 
 
 def report(checks: Sequence[Check]) -> str:
@@ -74,7 +76,8 @@ def report(checks: Sequence[Check]) -> str:
 
 
 def _harmless(line: str) -> str:
-    return "".join(it if it.isprintable() else "?" for it in line)
+    shown = line if len(line) <= _MOST_LETTERS else f"{line[:_MOST_LETTERS]} ..."
+    return "".join(it if it.isprintable() else "?" for it in shown)
 
 
 def check_archive(held: Unpacked, project: Path) -> tuple[list[Check], bool]:
@@ -115,7 +118,7 @@ def check_archive(held: Unpacked, project: Path) -> tuple[list[Check], bool]:
         check_inputs(run, elsewhere),
         check_columns(run),
         check_verdicts(run, project / "config/claims.yaml", alike(about, lock)),
-        *check_reference(run, project / "results/reference", lock),
+        *_check_reference(run, project, lock, settings.complete),
         check_nothing_to_do(held, run, project),
     ]
     return checks, not any(check.problems for check in checks)
@@ -131,9 +134,12 @@ def _run_of(held: Unpacked) -> Run:
 def _check_description(held: Unpacked, settings: str, lock: str, project: Path) -> Check:
     """Ask whether the archive is of the lock file here, and of the settings that it names."""
     about, config = held.about, "config/config.yaml"
-    problems = []
-    if about.lock != lock:
-        problems.append(f"{ABOUT}: made under another environment.lock than is here")
+    given = {ABOUT: about.lock, "environment.lock": held.digests.get("environment.lock")}
+    problems = [
+        f"{name}: another environment.lock than is here"
+        for name, digest in given.items()
+        if digest != lock
+    ]
     same_config = held.digests.get(config) == file_digest(project / config)
     if same_config and about.settings != settings:
         problems.append(f"{ABOUT}: names other settings than its files of settings are")
@@ -163,6 +169,17 @@ def check_digests(listed: Mapping[str, str], found: Mapping[str, str]) -> Check:
     ]
     problems += [f"{name}: not in {SUMS}" for name in sorted(found.keys() - listed.keys() - {SUMS})]
     return Check("digests", f"{len(listed)} files as listed in {SUMS}", problems)
+
+
+def _check_reference(run: Run, project: Path, lock: str, settings: Settings) -> list[Check]:
+    """Compare with the committed reference, and say in which settings it was another run."""
+    reference = project / "results/reference"
+    other: list[str] = []
+    with contextlib.suppress(InputError):
+        its = settings_of(committed(reference), project).complete
+        folders = ("results", "figures", "logs")
+        other = [it for it in differing(its, settings) if it not in folders]
+    return check_reference(run, reference, lock, other)
 
 
 def check_reference_itself(reference: Path) -> Check:
@@ -273,7 +290,7 @@ def check_here(study: Study) -> tuple[list[Check], bool]:
     reference = project / "results/reference"
     if reference.is_dir():
         checks.append(check_reference_itself(reference))
-        checks += check_reference(run, reference, study.lock_digest)
+        checks += _check_reference(run, project, study.lock_digest, study.settings)
     return checks, not any(check.problems for check in checks)
 
 

@@ -532,6 +532,27 @@ def records() -> Iterator[Hostile]:
     )
 
 
+def pictures() -> Iterator[Hostile]:
+    """What settings name as a picture, and is a program, or without end."""
+    page = struct.pack("<H2L", 1, 0, 0)[:2] + struct.pack("<2H2L", 256, 4, 1, 10)
+    many = b"".join(page + struct.pack("<L", 8 + 18 * (n + 1)) for n in range(100_000))
+    for name, data in {
+        "a program in PostScript": b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n(x) print\n",
+        "a pickle": pickle.dumps(Pickled()),
+        "an array of objects": b"\x93NUMPY\1\0v\0{'descr': '|O'}" + pickle.dumps(Pickled()),
+        "a page that comes again": b"II*\0\x08\0\0\0" + page + b"\x08\0\0\0",
+        "a hundred thousand pages": b"II*\0\x08\0\0\0" + many,
+        "nothing": b"",
+    }.items():
+        settings = {"settings/1-mine.yaml": b"reference: config/images/a.png"}
+        yield Hostile(
+            f"a picture that is {name}",
+            changed({**settings, "config/images/a.png": data}, overlays=[*settings]),
+            "a.png: no PNG, JPEG or TIFF that holds one picture",
+            quick="program" in name,
+        )
+
+
 def zips() -> Iterator[Hostile]:
     """What is wrong with the zip file itself."""
     whole = "not a whole zip file"
@@ -789,7 +810,7 @@ def descriptions() -> Iterator[Hostile]:
         yield Hostile(
             f"written by version {version[:12]!a}",
             changed({}, keystab=version),
-            "was written by keystab .*, and this is",
+            "was written by keystab .*, and this is|says nothing about a run",
             quick=version in ("0.1.0", "99.0"),
         )
     for name, data in {
@@ -799,7 +820,7 @@ def descriptions() -> Iterator[Hostile]:
         yield Hostile(f"archive.json is {name}", changed_whole(data), "archive.json")
     for key in ("lock", "settings"):
         yield Hostile(
-            f"another {key}", changed({}, **{key: 64 * "0"}), f"archive.json: .*{key}|made under"
+            f"another {key}", changed({}, **{key: 64 * "0"}), "archive.json: .*(settings|lock)"
         )
     yield Hostile(
         "no description", lambda members: zipped(without(members, "archive.json")), "no archive of"
@@ -807,7 +828,7 @@ def descriptions() -> Iterator[Hostile]:
     yield Hostile(
         "no records",
         lambda members: zipped({k: v for k, v in members.items() if not k.startswith(RECORDS)}),
-        "no record of what made it",
+        "final.sha256: missing, or without a record",
     )
 
 
@@ -822,5 +843,5 @@ def without(members: Members, *names: str) -> dict[str, bytes]:
 
 
 KINDS = [
-    *folders(), *code(), *overlays(), *records(), *zips(), *bombs(), *texts(), *descriptions(),
+    *folders(), *code(), *overlays(), *records(), *pictures(), *zips(), *bombs(), *texts(), *descriptions(),
 ]  # fmt: skip
