@@ -4,9 +4,34 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from project import QUICK, Project, copy_of_project
+import small_study
+from project import QUICK, Project, copy_of_project, forked
+
+from keystab.provenance import archive
+from keystab.provenance.study_folder import Study
+
+
+@pytest.fixture
+def snakemake_in_forks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run Snakemake in forks of this process, which spares its import every time."""
+    monkeypatch.setattr("keystab.provenance.study_folder.subprocess", SimpleNamespace(run=forked))
+
+
+@pytest.fixture(scope="session")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """A small study that has been run."""
+    study = small_study.write(tmp_path_factory.mktemp("small") / "study")
+    study.run(1)
+    return study
+
+
+@pytest.fixture(scope="session")
+def packed(ran: Study) -> Path:
+    """Its archive."""
+    return archive.pack(ran)
 
 
 @pytest.fixture

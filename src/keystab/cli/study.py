@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import argparse
 import time
-from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from keystab.provenance.unpacking import Unpacked
 
 
 def whence(args: argparse.Namespace) -> None:
@@ -40,10 +43,10 @@ def reference(args: argparse.Namespace) -> None:
 
 def verify(args: argparse.Namespace) -> int:
     """Check an archive, or the results that are here; recompute figures on request."""
+    from keystab.errors import InputError
     from keystab.provenance import verification
-    from keystab.provenance.lineage import file_digest
     from keystab.provenance.study_folder import Study, find_project
-    from keystab.provenance.unpacking import require_archive
+    from keystab.provenance.unpacking import committed, unpacked
     from keystab.utils.validation import integer, number
 
     integer("cores", args.cores, least=1)  # Snakemake waits for ever for the first of none
@@ -54,35 +57,39 @@ def verify(args: argparse.Namespace) -> int:
     if args.archive is None:
         print(f"results of {project}")
         checks, sound = verification.check_here(Study(project, args.configfile))
+        print(verification.report(checks), flush=True)
+        if args.recompute:  # the committed reference is compared with, whatever else is here
+            reference = project / "results/reference"
+            own = verification.check_reference_itself(reference)
+            if own.problems:
+                print(verification.report([own]))
+            sound = not own.problems and _recompute(args, committed(reference), project) and sound
     else:
-        require_archive(args.archive)
-        print(f"{args.archive}: sha256 {file_digest(args.archive)}")
-        checks, sound = verification.check_archive(args.archive, project)
-    print(verification.report(checks), flush=True)
-    if args.recompute and (sound or args.archive is None):
-        sound = _recompute(args, project) and sound
-    elif args.recompute:
-        print("nothing is recomputed: the archive is not what a run of the study packs")
+        # Taken apart once: what is recomputed is what was checked.
+        with unpacked(args.archive) as held:
+            try:
+                checks, sound = verification.check_archive(held, project)
+            except InputError as error:
+                raise InputError(f"{args.archive}: {error}") from None
+            print(
+                f"{args.archive}: sha256 {held.digest}\n{verification.report(checks)}", flush=True
+            )
+            if args.recompute and sound:
+                sound = _recompute(args, held, project)
+            elif args.recompute:
+                print("nothing is recomputed: the archive is not what a run of the study packs")
     verdict = "verified" if sound else "NOT verified: see the lines marked FAILED"
     print(f"{verdict} ({time.monotonic() - start:.0f} s)")
     return 0 if sound else 1
 
 
-def _recompute(args: argparse.Namespace, project: Path) -> bool:
+def _recompute(args: argparse.Namespace, held: Unpacked, project: Path) -> bool:
     """Compute figures again with the code that is here; whether the numbers are the same."""
     from keystab.provenance import recomputation, verification
-    from keystab.provenance.unpacking import committed, unpacked
 
-    reference = project / "results/reference"
-    if args.archive is None:  # the committed reference is compared with, whatever else is here
-        own = verification.check_reference_itself(reference)
-        if own.problems:
-            print(verification.report([own]))
-            return False
-    with unpacked(args.archive) if args.archive else nullcontext(committed(reference)) as held:
-        print(f"recomputing {' '.join(args.recompute)} with the code of {project}", flush=True)
-        checks, same = recomputation.recompute(
-            held, project, args.recompute, args.cores, args.rtol, args.atol
-        )
+    print(f"recomputing {' '.join(args.recompute)} with the code of {project}", flush=True)
+    checks, same = recomputation.recompute(
+        held, project, args.recompute, args.cores, args.rtol, args.atol
+    )
     print(f"recomputed {' '.join(args.recompute)}\n{verification.report(checks)}")
     return same

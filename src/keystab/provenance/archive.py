@@ -27,6 +27,7 @@ from keystab.provenance.ro_crate import Item, crate_text
 from keystab.provenance.run_description import (
     ABOUT,
     LEFT_OUT,
+    LEFT_OUT_COLUMNS,
     SUMS,
     About,
     arithmetic,
@@ -37,9 +38,9 @@ from keystab.provenance.study_folder import Output, Study
 from keystab.utils.files import written_whole
 from keystab.utils.memory import in_words
 
-__all__ = ["Contents", "about_study", "is_final", "pack", "publish"]
+__all__ = ["MORE", "SOURCES", "Contents", "about_study", "is_final", "pack", "publish"]
 
-_SOURCES = (
+SOURCES = (
     "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "DEVIATIONS.md", "LICENSE", "Makefile",
     "README.md", "REPRODUCING.md", "Snakefile", "environment.lock", "pyproject.toml",
     "results/README.md", ".ci", "benchmarks", "config", "docs", "profiles", "src", "tests", "tools",
@@ -47,7 +48,7 @@ _SOURCES = (
 )  # fmt: skip
 """Files and folders that make up the project; a file that a copy lacks is not missed."""
 
-_MORE = ("*.html", "report/*.html", "claims_pictures.*")
+MORE = ("*.html", "report/*.html", "claims_pictures.*")
 """Results that are made only where they are asked for, by their places in the folder of results."""
 
 _PLAIN, _EXECUTABLE = 0o644, 0o755
@@ -235,7 +236,7 @@ def _members(contents: Contents) -> Iterator[tuple[str, bytes]]:
         yield _overlay(number, overlay), (project / overlay).read_bytes()
     for output in contents.kept:
         yield output.path, (project / output.path).read_bytes()
-    for pattern in _MORE:
+    for pattern in MORE:
         for path in sorted((project / study.results).glob(pattern)):
             yield path.relative_to(project).as_posix(), path.read_bytes()
     for record in contents.records.values():
@@ -250,7 +251,7 @@ def _overlay(number: int, path: Path) -> str:
 
 
 def _source_files(project: Path) -> Iterator[Path]:
-    for name in _SOURCES:
+    for name in SOURCES:
         path = project / name
         files = path.rglob("*") if path.is_dir() else [path]
         for file in files:
@@ -275,7 +276,7 @@ def _listed(outputs: Iterable[Output], contents: Contents) -> str:
     """Table of files that are not there: how big they are, what is in them, and what makes them."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["path", "bytes", "sha256", "rule"])
+    writer.writerow(LEFT_OUT_COLUMNS)
     recorded: dict[str, str] = {}
     for record in contents.records.values():
         recorded |= record.digests

@@ -122,8 +122,9 @@ def _followed(
     if relation.low:
         low, high = np.full((2, len(part)), np.nan)
         known = (part >= 0) & (part <= whole) & (whole > 0)
-        if known.any():
-            low[known], high[known] = wilson_interval(part[known], whole[known])
+        with np.errstate(all="ignore"):
+            if known.any():
+                low[known], high[known] = wilson_interval(part[known], whole[known])
         yield relation.low, low
         yield relation.high, high
 
@@ -135,7 +136,8 @@ def _numbers(table: pd.DataFrame, column: str) -> np.ndarray:
 
 
 def _compared(column: str, found: np.ndarray, expected: np.ndarray) -> Iterator[str]:
-    same = np.isclose(found, expected, rtol=_RTOL, atol=_ATOL, equal_nan=True)
+    with np.errstate(all="ignore"):
+        same = np.isclose(found, expected, rtol=_RTOL, atol=_ATOL, equal_nan=True)
     if not same.all():
         row = int(np.flatnonzero(~same)[0])
         yield (

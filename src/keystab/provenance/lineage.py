@@ -20,7 +20,10 @@ __all__ = ["code_of_figure", "file_digest", "read_figure_metadata", "whence"]
 _SHORT = 12
 _MOST_PIXELS = 100_000_000
 _ESCAPE = re.compile(rb"\\([0-7]{1,3}|.)", re.DOTALL)
+_KEYWORDS_START = b"/Keywords ("
 _KEYWORDS = re.compile(rb"/Keywords \(((?:[^()\\]|\\.)*)\)", re.DOTALL)
+_MOST_BYTES = 100_000
+"""Of a passport in a PDF, which lists the tables of one figure."""
 
 
 def read_figure_metadata(path: Path | str, as_drawn: bool = False) -> FigureMetadata:
@@ -65,7 +68,9 @@ def read_figure_metadata(path: Path | str, as_drawn: bool = False) -> FigureMeta
 
 def _text_of_pdf(path: Path, as_drawn: bool) -> str | None:
     if as_drawn:
-        found = _KEYWORDS.search(path.read_bytes())
+        data = path.read_bytes()
+        start = max(data.find(_KEYWORDS_START), 0)
+        found = _KEYWORDS.match(data[start : start + _MOST_BYTES])
         return _ESCAPE.sub(_unescaped, found[1]).decode("latin-1") if found else None
     from pypdf import PdfReader
     from pypdf.errors import PyPdfError
@@ -88,7 +93,7 @@ def _text_of_png(path: Path, as_drawn: bool) -> str | None:
 
     try:
         # Opening reads what stands before the pixels; what stands behind needs these decoded.
-        with warnings.catch_warnings(action="ignore"), Image.open(path) as picture:
+        with warnings.catch_warnings(action="ignore"), Image.open(path, formats=["PNG"]) as picture:
             if not as_drawn and picture.width * picture.height <= _MOST_PIXELS:
                 picture.load()
             found = picture.info.get(PNG_KEY)

@@ -15,8 +15,8 @@ from keystab.provenance.result_checks import (
     Check,
     alike,
     compare_tables,
+    compare_verdicts,
     left_out_digests,
-    verdicts_in,
 )
 from keystab.provenance.run_description import About
 from keystab.provenance.snakemake_records import Record, read_records
@@ -70,7 +70,7 @@ def recompute(
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
         copy_workflow(project, scratch)
-        study = Study(scratch, place_settings(held, project, scratch))
+        study = Study(scratch, place_settings(held, project, scratch), home=scratch)
         drawn = [
             f"{study.figures}/{target}.{kind}" for target in targets for kind in ("pdf", "png")
         ]
@@ -91,7 +91,8 @@ def recompute(
             _compare_figures(source, study, records, about),
         ]
         if everything:
-            checks.append(_compare_verdicts(source, scratch / study.results, about))
+            inside = source if (source / "claims.csv").is_file() else source / about.results
+            checks.append(compare_verdicts(inside, scratch / study.results))
         checks.append(_compare_left_out(source, study, records, about))
     return checks, not any(check.problems for check in checks)
 
@@ -112,19 +113,6 @@ def _compare_figures(
     words = f"{len(paths) - len(told)} of {len(paths)} the same to the last bit"
     same_machine = alike(about, study.lock_digest)
     return Check("figures", words, told if same_machine else [], [] if same_machine else told)
-
-
-def _compare_verdicts(source: Path, found: Path, about: About) -> Check:
-    """Compare the verdicts on claims."""
-    path = source / "claims.csv"
-    path = path if path.is_file() else source / about.results / "claims.csv"
-    before, after = verdicts_in(path), verdicts_in(found / "claims.csv")
-    problems = [
-        f"{name}: {before.get(name, 'no verdict')} became {after.get(name, 'no verdict')}"
-        for name in sorted(before.keys() | after.keys())
-        if before.get(name) != after.get(name)
-    ]
-    return Check("claims", f"{len(before)} verdicts the same", problems)
 
 
 def _compare_left_out(

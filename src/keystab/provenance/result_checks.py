@@ -8,19 +8,32 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
+import json
+import math
+import re
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from keystab.errors import InputError
-from keystab.io.checksums import read_sums
 from keystab.io.figure_metadata import FigureMetadata
 from keystab.provenance import table_differences
 from keystab.provenance.column_relations import broken_relations
 from keystab.provenance.lineage import code_of_figure, file_digest, read_figure_metadata
-from keystab.provenance.run_description import LEFT_OUT, About, arithmetic, read_about
+from keystab.provenance.run_description import (
+    LEFT_OUT,
+    LEFT_OUT_COLUMNS,
+    About,
+    arithmetic,
+    read_about,
+)
 from keystab.provenance.snakemake_records import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from keystab.study.claims import Claim
 
 __all__ = [
     "FINAL",
@@ -33,12 +46,19 @@ __all__ = [
     "check_reference",
     "check_verdicts",
     "compare_tables",
+    "compare_verdicts",
     "left_out_digests",
+    "left_out_rows",
+    "listed_in",
 ]
 
 FINAL = "final.sha256"
 """List of all that a run ends in, in the folder of its results."""
 
+_SUM = re.compile("([0-9a-f]{64})  ([^\n]+)\n")
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+_MOST_NAMED = 5
+_MOST_BYTES_OF_LINE, _MOST_ROWS_OF_JOIN = 4000, 5_000_000
 _VERDICTS = ("claims.csv", "claims.json", "claims.md")
 _GREY_LEVELS, _SHARE_OF_PIXELS = 32, 0.005
 
@@ -66,11 +86,31 @@ class Check:
 
 
 class Run(NamedTuple):
-    """A finished run: where it lies, what it says of itself, and Snakemake's records of it."""
+    """A finished run.
+
+    Parameters
+    ----------
+    folder : path
+        Where it lies.
+    about : About
+        What it says of itself.
+    records : mapping from str to Record
+        Snakemake's records of it, by output.
+    digests : mapping from str to str, optional
+        SHA-256 of all its files by name, where they are known.
+    """
 
     folder: Path
     about: About
     records: Mapping[str, Record]
+    digests: Mapping[str, str] | None = None
+
+    def digest(self, name: str) -> str | None:
+        """SHA-256 of one of its files; None where there is no such."""
+        if self.digests is not None:
+            return self.digests.get(name)
+        path = self.folder / name
+        return file_digest(path) if path.is_file() else None
 
     def files(self, place: str, *suffixes: str) -> list[Path]:
         """Files of one of its folders by suffix, sorted."""
@@ -109,15 +149,15 @@ def check_final(run: Run) -> Check:
     if not path.is_file() or place not in run.records:
         return Check("final", "", [f"{place}: missing, or without a record; make study makes it"])
     try:
-        listed = read_sums(path.read_text(encoding="utf-8"))
-    except UnicodeError:
-        return Check("final", "", [f"{place}: is no list of digests"])
+        listed = listed_in(path)
+    except InputError as error:
+        return Check("final", "", [f"{place}: {error}"])
     recorded = run.records[place].digests
-    there = {run.name(it): it for it in (*run.figures, *run.tables, *run.verdicts)}
-    problems = [f"{name}: missing" for name in sorted(listed.keys() - there.keys())]
-    problems += [f"{name}: not in {place}" for name in sorted(there.keys() - listed.keys())]
-    for name in sorted(listed.keys() & there.keys()):
-        if file_digest(there[name]) != listed[name]:
+    there = {run.name(it) for it in (*run.figures, *run.tables, *run.verdicts)}
+    problems = [f"{name}: missing" for name in sorted(listed.keys() - there)]
+    problems += [f"{name}: not in {place}" for name in sorted(there - listed.keys())]
+    for name in sorted(listed.keys() & there):
+        if run.digest(name) != listed[name]:
             problems.append(f"{name}: not as it was when the run ended")
     problems += [
         f"{name}: {place} says otherwise than the record of the run"
@@ -125,6 +165,25 @@ def check_final(run: Run) -> Check:
         if listed.get(name) != recorded.get(name)
     ]
     return Check("final", f"{len(listed)} figures, tables and verdicts as the run ended", problems)
+
+
+def listed_in(path: Path) -> dict[str, str]:
+    """Digests by file name, from a list that a stranger may have written.
+
+    Raises
+    ------
+    InputError
+        If there is anything else in it, or a file twice. The name of the list is to be put before.
+    """
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeError:
+        text = "?"
+    found = _SUM.findall(text)
+    listed = {name: digest for digest, name in found}
+    if len(listed) < len(found) or "".join(f"{it[0]}  {it[1]}\n" for it in found) != text:
+        raise InputError("is no list of digests")
+    return listed
 
 
 def check_figures(run: Run, lock: str) -> Check:
@@ -150,16 +209,19 @@ def check_figures(run: Run, lock: str) -> Check:
             code[passport.figure] = code_of_figure(passport.figure)
         if passport.figure != path.stem:
             problems.append(f"{name}: is figure {passport.figure}")
+        if passport.version != run.about.keystab:
+            problems.append(f"{name}: drawn by another version, {passport.version[:20]!a}")
         if passport.code != code[passport.figure]:
             problems.append(f"{name}: drawn by other code than is here")
         if passport.lock != lock:
             problems.append(f"{name}: drawn under another environment.lock than is here")
         for table, digest in passport.tables.items():
-            found = run.folder / run.about.results / "tables" / table
+            found = run.digest(f"{run.about.results}/tables/{table}")
             tables.add(table)
-            if not found.is_file() or file_digest(found) != digest:
-                state = "changed" if found.is_file() else "missing"
-                problems.append(f"{name}: drawn from another {table} than the one here ({state})")
+            if found != digest:
+                state = "missing" if found is None else "changed"
+                told = f"drawn from another {table[:80]} than the one here ({state})"
+                problems.append(f"{name}: {told}")
     words = f"{len(run.figures)} drawn from the {len(tables)} tables here, by this code and lock"
     return Check("figures", words, problems)
 
@@ -175,7 +237,8 @@ def check_verdicts(run: Run, claims: Path, exact: bool) -> Check:
     exact : bool
         Whether every bit has to be the same; else verdicts have to be, and texts may differ.
     """
-    from keystab.io.tables import read_table
+    import numpy as np
+
     from keystab.study.claims import read_claims, table_names
     from keystab.study.claims_report import write_report
     from keystab.study.verdicts import outcomes_of
@@ -189,33 +252,59 @@ def check_verdicts(run: Run, claims: Path, exact: bool) -> Check:
     try:
         asked = read_claims(claims)
         tables = {
-            name: read_table(folder / "tables" / f"{name}.csv") for name in table_names(asked)
+            name: _read_plain(folder / "tables" / f"{name}.csv") for name in table_names(asked)
         }
+        _check_joins(asked, tables)
         with tempfile.TemporaryDirectory() as scratch:
             again = [Path(scratch) / name for name in _VERDICTS]
-            write_report(outcomes_of(asked, tables), *again)
+            with np.errstate(all="ignore"):
+                write_report(outcomes_of(asked, tables), *again)
             for path in again:
                 if path.read_bytes() == (folder / path.name).read_bytes():
                     continue
                 place = f"{run.about.results}/{path.name}"
-                told = list(_other_verdicts(folder / path.name, path))
-                told = told or (["other numbers or words than its tables give"] if exact else [])
+                told = list(_other_verdicts(verdicts_in(folder / path.name), verdicts_in(path)))
+                if not told and (exact or not _but_for_rounding(folder / path.name, path)):
+                    told = ["other numbers or words than its tables give"]
                 problems += [f"{place}: {it}" for it in told]
-    except (InputError, ValueError, TypeError, KeyError, csv.Error, RecursionError) as error:
-        said = " ".join(str(error).replace(f"{run.folder}/", "").split())
-        return Check("verdicts", "", [said[:200] or "cannot be judged from the tables here"])
+    except InputError as error:
+        return Check("verdicts", "", [str(error).replace(f"{run.folder}/", "")])
+    except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
+        return Check("verdicts", "", ["the tables here are not such that claims can be judged"])
     return Check("verdicts", f"{len(asked)} judged again from the tables, all the same", problems)
 
 
-def _other_verdicts(given: Path, again: Path) -> Iterator[str]:
+def _check_joins(claims: Iterable[Claim], tables: Mapping[str, pd.DataFrame]) -> None:
+    """Raise where joining tables gives more rows than are handled in bounded memory."""
+    for joined in {part.tables for claim in claims for part in claim.quantities if part.tables}:
+        first, *others = (tables[name] for name in joined)
+        rows = len(first)
+        for other in others:
+            shared = [name for name in first if name in other]
+            if shared and len(other):
+                rows *= int(other.groupby(shared, dropna=False).size().max())
+        if rows > _MOST_ROWS_OF_JOIN:
+            raise InputError(f"{' and '.join(joined)}: give too many rows when they are joined")
+
+
+def _other_verdicts(before: Mapping[str, str], after: Mapping[str, str]) -> Iterator[str]:
     """Verdicts that are not those which the tables give."""
-    before, after = verdicts_in(given), verdicts_in(again)
     for name in sorted(before.keys() | after.keys()):
         if before.get(name) != after.get(name):
             yield (
-                f"{name[:60]} is {str(before.get(name, 'absent'))[:40]!r}, its tables give "
+                f"{name[:60]} is {before.get(name, 'absent')[:40]!r}, its tables give "
                 f"{after.get(name, 'no such claim')!r}"
             )
+
+
+def _but_for_rounding(one: Path, other: Path) -> bool:
+    """Whether two texts hold the same words, and numbers that differ by rounding at most."""
+    texts = [path.read_text(encoding="utf-8") for path in (one, other)]
+    words, numbers = zip(*((_NUMBER.split(it), _NUMBER.findall(it)) for it in texts), strict=True)
+    return words[0] == words[1] and all(
+        math.isclose(float(a), float(b), rel_tol=2e-3, abs_tol=1e-9)
+        for a, b in zip(*numbers, strict=True)
+    )
 
 
 def verdicts_in(path: Path) -> dict[str, str]:
@@ -223,35 +312,78 @@ def verdicts_in(path: Path) -> dict[str, str]:
 
     Raises
     ------
-    ValueError, TypeError, KeyError, csv.Error
-        If it is no ledger.
+    InputError
+        If it is no ledger. The name of the file is part of the text.
     """
-    import json
+    try:
+        text = path.read_text(encoding="utf-8")
+        found = list(_VERDICTS_OF[path.suffix](text))
+    except (ValueError, TypeError, KeyError, LookupError, csv.Error, RecursionError):
+        raise InputError(f"{path}: is no ledger of claims") from None
+    verdicts = dict(found)
+    known = all(isinstance(it, str) for pair in found for it in pair)
+    if not known or len(verdicts) < len(found):
+        raise InputError(f"{path}: is no ledger of claims")
+    return verdicts
 
-    text = path.read_text(encoding="utf-8")
-    if path.suffix == ".csv":
-        return {row["id"]: row["verdict"] for row in csv.DictReader(io.StringIO(text))}
-    if path.suffix == ".json":
-        return {str(row["id"]): str(row["verdict"]) for row in json.loads(text)}
-    verdict, found = "", {}
+
+def _verdicts_of_csv(text: str) -> Iterator[tuple[str, str]]:
+    for row in csv.DictReader(io.StringIO(text, newline=""), strict=True):
+        yield row["id"], row["verdict"]
+
+
+def _verdicts_of_json(text: str) -> Iterator[tuple[str, str]]:
+    for row in json.loads(text):
+        yield row["id"], row["verdict"]
+
+
+def _verdicts_of_markdown(text: str) -> Iterator[tuple[str, str]]:
+    verdict = ""
     for line in text.split("\n"):
         if line.startswith("## "):
             verdict = line.removeprefix("## ").lower()
         elif line.startswith("| `"):
-            found[line.split("`")[1]] = verdict
-    return found
+            yield line.split("`")[1], verdict
+
+
+_VERDICTS_OF = {
+    ".csv": _verdicts_of_csv,
+    ".json": _verdicts_of_json,
+    ".md": _verdicts_of_markdown,
+}
+
+
+def _read_plain(path: Path) -> pd.DataFrame:
+    """Read a table in bounded memory, as all programs read it.
+
+    Raises
+    ------
+    InputError
+        If a line is very long, or has more fields than there are names.
+    """
+    import pandas as pd
+
+    from keystab.io.tables import read_table
+
+    if path.is_file():
+        with path.open("rb") as lines:
+            while line := lines.readline(_MOST_BYTES_OF_LINE + 1):
+                if len(line) > _MOST_BYTES_OF_LINE:
+                    raise InputError(f"{path}: has too long lines for a table")
+    table = read_table(path)
+    if not isinstance(table.index, pd.RangeIndex):
+        raise InputError(f"{path}: has more fields than names")
+    return table
 
 
 def check_columns(run: Run) -> Check:
     """Ask of each table whether its columns follow from one another where they have to."""
-    from keystab.io.tables import read_table
-
     problems, asked = [], 0
     for path in run.tables:
         if path.suffix != ".csv":
             continue
         try:
-            broken = broken_relations(path.stem, read_table(path))
+            broken = broken_relations(path.stem, _read_plain(path))
         except InputError as error:
             broken = [str(error).removeprefix(f"{path}: ")]
         asked += 1
@@ -264,7 +396,7 @@ def check_columns(run: Run) -> Check:
 # What another run says
 
 
-def check_reference(run: Run, reference: Path, lock: str) -> list[Check]:
+def check_reference(run: Run, reference: Path, lock: str, other: Sequence[str] = ()) -> list[Check]:
     """Compare tables, verdicts and figures with the committed reference.
 
     Parameters
@@ -274,6 +406,8 @@ def check_reference(run: Run, reference: Path, lock: str) -> list[Check]:
         Folder that `keystab.provenance.archive.publish` wrote.
     lock : str
         SHA-256 of the lock file here.
+    other : sequence of str, optional
+        Names of settings that are not those of the reference, as far as they are known.
 
     Returns
     -------
@@ -285,25 +419,41 @@ def check_reference(run: Run, reference: Path, lock: str) -> list[Check]:
     except InputError as error:
         return [Check("results/reference", f"not compared: {str(error).split('; ')[0]}")]
     if about.settings != run.about.settings:
-        return [Check("results/reference", "not compared: it was made with other settings")]
+        named = ", ".join(other[:_MOST_NAMED]) + (" and more" if len(other) > _MOST_NAMED else "")
+        told = "not compared: it was made with other settings" + (f": {named}" if named else "")
+        return [Check("results/reference", told)]
     exact = alike(about, run.about.lock, run.about.arithmetic)
-    before, after = (
-        verdicts_in(folder / "claims.csv") if (folder / "claims.csv").is_file() else {}
-        for folder in (reference, run.folder / run.about.results)
-    )
-    told = [
-        f"{name}: {before.get(name, 'no verdict')} in results/reference, "
-        f"{after.get(name, 'no verdict')} here"
-        for name in sorted(before.keys() | after.keys())
-        if before.get(name) != after.get(name)
-    ]
     return [
         compare_tables(
             reference, run.folder / run.about.results, lock, machine=run.about.arithmetic
         ),
-        Check("claims", f"{len(before)} verdicts as in results/reference", told),
+        compare_verdicts(reference, run.folder / run.about.results),
         _compare_pictures(run, reference, about, exact),
     ]
+
+
+def compare_verdicts(reference: Path, results: Path) -> Check:
+    """Compare the verdicts on claims of two runs.
+
+    Parameters
+    ----------
+    reference, results : path
+        Folders of results; where there are no verdicts, none are compared.
+    """
+    try:
+        before, after = (
+            verdicts_in(folder / "claims.csv") if (folder / "claims.csv").is_file() else {}
+            for folder in (reference, results)
+        )
+    except InputError as error:
+        return Check("claims", "", [f"claims.csv: {str(error).partition(': ')[2]}"])
+    told = [
+        f"{name[:60]}: {before.get(name, 'no verdict')} before, "
+        f"{after.get(name, 'no verdict')[:40]} now"
+        for name in sorted(before.keys() | after.keys())
+        if before.get(name) != after.get(name)
+    ]
+    return Check("claims", f"{len(before)} verdicts the same", told)
 
 
 def _compare_pictures(run: Run, reference: Path, about: About, exact: bool) -> Check:
@@ -321,7 +471,7 @@ def _compare_pictures(run: Run, reference: Path, about: About, exact: bool) -> C
             its = read_figure_metadata(expected, as_drawn=True)
         except InputError:
             continue  # said by check_figures
-        if (mine.code, mine.lock, mine.version) != (its.code, its.lock, its.version):
+        if (mine.code, mine.lock) != (its.code, its.lock):
             by_other_code += 1
             continue
         told = ""
@@ -329,7 +479,7 @@ def _compare_pictures(run: Run, reference: Path, about: About, exact: bool) -> C
             told = _other_pixels(path, expected, _same_tables(mine, its))
         elif _same_tables(mine, its) and exact and about.zlib and about.zlib == run.about.zlib:
             known = digests.get(path.name)
-            told = "" if known in (None, file_digest(path)) else "other bytes"
+            told = "" if known in (None, run.digest(run.name(path))) else "other bytes"
         if told:
             problems.append(f"{run.name(path)}: not as in results/reference: {told}")
         else:
@@ -351,13 +501,13 @@ def _other_pixels(path: Path, expected: Path, same_tables: bool) -> str:
     from PIL import Image
 
     try:
-        with Image.open(path) as one, Image.open(expected) as other:
+        with Image.open(path, formats=["PNG"]) as one, Image.open(expected) as other:
             if one.size != other.size:
                 return (
                     f"{one.size[0]} x {one.size[1]} pixels, there {other.size[0]} x {other.size[1]}"
                 )
             a, b = (np.asarray(it.convert("RGB"), dtype=np.int16) for it in (one, other))
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+    except (OSError, SyntaxError, ValueError, LookupError, Image.DecompressionBombError):
         return "cannot be read"
     distance = np.abs(a - b).max(axis=2)
     if same_tables:
@@ -367,8 +517,8 @@ def _other_pixels(path: Path, expected: Path, same_tables: bool) -> str:
     return f"{share:.1%} of its pixels differ clearly" if share > _SHARE_OF_PIXELS else ""
 
 
-def left_out_digests(folder: Path) -> dict[str, str]:
-    """Digests of the files that a run left out, by their paths; none where nothing was.
+def left_out_rows(folder: Path) -> dict[str, dict[str, str]]:
+    """What a run says of the files that it left out, by their paths; none where nothing was.
 
     Raises
     ------
@@ -380,9 +530,19 @@ def left_out_digests(folder: Path) -> dict[str, str]:
         return {}
     try:
         with path.open(newline="", encoding="utf-8") as lines:
-            return {row["path"]: row["sha256"] for row in csv.DictReader(lines)}
-    except (ValueError, KeyError, csv.Error):
-        raise InputError(f"{LEFT_OUT}: is no list of files; get the archive again") from None
+            names, *rows = csv.reader(lines, strict=True)
+    except (ValueError, csv.Error):
+        names, rows = [], []
+    found = {row[0]: dict(zip(names, row, strict=False)) for row in rows if row}
+    sound = names == LEFT_OUT_COLUMNS and all(len(row) == len(names) for row in rows)
+    if not sound or len(found) < len(rows) or not all(it.isprintable() for it in found):
+        raise InputError(f"{LEFT_OUT}: is no list of files; get the archive again")
+    return found
+
+
+def left_out_digests(folder: Path) -> dict[str, str]:
+    """Digests of the files that a run left out, by their paths; see `left_out_rows`."""
+    return {name: row["sha256"] for name, row in left_out_rows(folder).items()}
 
 
 def compare_tables(

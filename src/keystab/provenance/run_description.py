@@ -7,7 +7,7 @@ import json
 import platform
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from keystab._version import __version__
 from keystab.errors import InputError
@@ -15,6 +15,7 @@ from keystab.errors import InputError
 __all__ = [
     "ABOUT",
     "LEFT_OUT",
+    "LEFT_OUT_COLUMNS",
     "SUMS",
     "About",
     "about_of",
@@ -26,6 +27,7 @@ __all__ = [
 ABOUT = "archive.json"
 SUMS = "SHA256SUMS"
 LEFT_OUT = "left-out.csv"
+LEFT_OUT_COLUMNS = ["path", "bytes", "sha256", "rule"]
 MOST_BYTES_OF_ABOUT = 1_000_000
 
 _OWN = {
@@ -36,6 +38,8 @@ _OWN = {
 
 _PART = re.compile(r"\w[\w .+-]*(?<![ .])")
 _DIGEST = re.compile("[0-9a-f]{64}")
+_VERSION = re.compile(r"[\w.+-]{1,30}", re.ASCII)
+_MOST_LETTERS, _MOST_OVERLAYS = 1000, 50
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +70,7 @@ class About:
     figures: str
     logs: str
     arithmetic: str
-    zlib: str = ""
+    zlib: str
 
 
 def read_about(folder: Path) -> About:
@@ -105,27 +109,35 @@ def about_of(data: bytes) -> About:
         said: Any = json.loads(data.decode("utf-8"))
     except (ValueError, RecursionError):
         raise InputError("is not JSON; make archive writes it") from None
-    if not isinstance(said, dict) or not isinstance(said.get("keystab"), str):
+    said = said if isinstance(said, dict) else {}
+    if not _is_text(version := said.get("keystab")) or not _VERSION.fullmatch(version):
         raise InputError("says nothing about a run; make archive writes it")
-    if said["keystab"] != __version__:
+    if version != __version__:
         raise InputError(
-            f"was written by keystab {said['keystab'][:20]}, and this is {__version__}: check it "
-            "with that version"
+            f"was written by keystab {version}, and this is {__version__}: check it with that "
+            "version"
         )
-    texts = ("lock", "settings", "results", "figures", "logs", "arithmetic")
+    texts = ("lock", "settings", "results", "figures", "logs", "arithmetic", "zlib")
     overlays = said.get("overlays")
     if (
-        not all(isinstance(said.get(key), str) for key in texts)
+        not all(_is_text(said.get(key)) for key in texts)
         or not all(_DIGEST.fullmatch(said[key]) for key in ("lock", "settings"))
         or not isinstance(overlays, list)
-        or not all(isinstance(one, str) for one in overlays)
+        or not all(map(_is_text, overlays))
+        or len(overlays) > _MOST_OVERLAYS
+        or len(set(overlays)) < len(overlays)
     ):
         raise InputError("says nothing about a run; make archive writes it")
     for key in ("results", "figures", "logs"):
         if problem := folder_problem(said[key]):
             raise InputError(f"names as {key} {said[key][:80]!a}, which {problem}")
     about = {key: said[key] for key in texts}
-    return About(said["keystab"], overlays=tuple(overlays), zlib=str(said.get("zlib", "")), **about)
+    return About(version, overlays=tuple(overlays), **about)
+
+
+def _is_text(value: Any) -> TypeGuard[str]:
+    """Whether something is text as a run says it: short, without what a terminal would obey."""
+    return isinstance(value, str) and len(value) <= _MOST_LETTERS and value.isprintable()
 
 
 def folder_problem(text: str) -> str:
@@ -139,9 +151,9 @@ def folder_problem(text: str) -> str:
     "is one of the project's own; give another"
     """
     parts = text.split("/")
-    if not text.isprintable() or not all(_PART.fullmatch(part) for part in parts):
+    if len(text) > 200 or not (text.isprintable() and all(map(_PART.fullmatch, parts))):
         return "is no folder within the project; give names with / between them"
-    if parts[0].casefold() in _OWN or text.casefold() == "results/reference":
+    if parts[0].casefold() in _OWN or f"{text.casefold()}/".startswith("results/reference/"):
         return "is one of the project's own; give another"
     return ""
 

@@ -162,10 +162,9 @@ def read_foreign_records(folder: Path, results: Iterable[str]) -> dict[str, Reco
             kept = {key: fields[key] for key in _TYPES}
         except (ValueError, KeyError, TypeError, RecursionError):
             raise InputError(f"{name}: not a record of Snakemake") from None
-        checksums = kept["input_checksums"] or {}
-        texts = [*kept["params"], *kept["log"]] if _typed(kept) else [None]
-        if not all(isinstance(it, str) for it in (*texts, *kept["input"], *checksums.values())):
+        if not _typed(kept) or path != _place(output):
             raise InputError(f"{name}: not a record of Snakemake")
+        checksums = kept["input_checksums"] or {}
         if not output.startswith(places) or _leads_out(output) or output in records:
             raise InputError(f"{name}: records {output[:80]!a}, which is no result of this run")
         if outside := [it for it in (*kept["input"], *checksums) if _leads_out(it)]:
@@ -180,17 +179,29 @@ def read_foreign_records(folder: Path, results: Iterable[str]) -> dict[str, Reco
 def place_records(records: Mapping[str, Record], project: Path) -> None:
     """Write records where Snakemake looks for them in a project."""
     for record in records.values():
-        path = project / FOLDER / record.path
+        path = project / FOLDER / _place(record.output)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(record.fields), encoding="utf-8")
 
 
 def _typed(fields: Mapping[str, Any]) -> bool:
     """Whether the fields of a record have the types that Snakemake gives them."""
-    return not fields["incomplete"] and all(
+    if fields["incomplete"] or not all(
         isinstance(fields[key], kinds) and isinstance(fields[key], bool) == (bool in kinds)
         for key, kinds in _TYPES.items()
-    )
+    ):
+        return False
+    digests = (fields["input_checksums"] or {}).values()
+    texts = (*fields["params"], *fields["log"], *fields["input"], *digests)
+    times = (fields["starttime"] or 0, fields["endtime"] or 0)
+    return all(isinstance(it, str) for it in texts) and all(abs(it) < 1e12 for it in times)
+
+
+def _place(output: str) -> str:
+    """Path of a record within `FOLDER`, as Snakemake spells it where names have 255 bytes."""
+    text = base64.urlsafe_b64encode(output.encode()).decode()
+    parts = [text[start : start + 254] for start in range(0, len(text), 254)]
+    return "/".join([*(f"@{part}" for part in parts[:-1]), *parts[-1:]])
 
 
 def _leads_out(path: str) -> bool:

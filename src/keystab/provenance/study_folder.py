@@ -19,10 +19,12 @@ from keystab.errors import InputError
 from keystab.provenance.code_digest import folder_of_loops
 from keystab.study.settings import Settings, checked, read_yaml
 
-__all__ = ["Output", "Study", "find_project", "jobs_and_reasons"]
+__all__ = ["Output", "Study", "find_project", "jobs_and_reasons", "settings_digest"]
 
 _FOLDERS = ("results", "figures", "logs")
 _JOB = re.compile(r"^Job \d+: (.*)\n *[Rr]eason: (.*)$", re.MULTILINE)
+_NOTHING = re.compile("^Nothing to be done", re.MULTILINE)
+_JOBS = re.compile("^Job stats:", re.MULTILINE)
 _FOLLOWS = ("Input files updated by another job", "Missing output files")
 _DIGEST = re.compile(r"(?:code of [\w.]+ = |environment\.lock = |')[0-9a-f]{64}'?")  # common.smk
 _LONG = re.compile("Union of exclusive params before and now across all output: ")
@@ -50,6 +52,8 @@ class Study:
         Files of settings; later ones win. They are relative to the project unless absolute.
     most_seconds : float, optional
         Longest time that Snakemake may take to plan; without end by default.
+    home : path, optional
+        Folder for what Snakemake keeps of its own; the user's by default.
 
     Raises
     ------
@@ -62,9 +66,11 @@ class Study:
         project: Path,
         overlays: Sequence[Path | str] = (),
         most_seconds: float | None = None,
+        home: Path | None = None,
     ) -> None:
         self.project = Path(project)
         self.most_seconds = most_seconds
+        self.home = home
         self.overlays = [Path(overlay) for overlay in overlays]
         if not (self.project / "Snakefile").is_file():
             raise InputError(f"{project}: no Snakefile there; go to the project's folder")
@@ -77,8 +83,7 @@ class Study:
     @property
     def settings_digest(self) -> str:
         """SHA-256 of all settings but the names of the folders that results go to."""
-        scientific = {key: value for key, value in self.settings.items() if key not in _FOLDERS}
-        return hashlib.sha256(json.dumps(scientific, sort_keys=True).encode()).hexdigest()
+        return settings_digest(self.settings)
 
     @property
     def lock_digest(self) -> str:
@@ -122,7 +127,8 @@ class Study:
             If Snakemake cannot plan the study.
         """
         said = self.snakemake("--dry-run", *targets)
-        if "Nothing to be done" in said:
+        # What it says also holds text of records, which a stranger may have written.
+        if _NOTHING.search(said) and not _JOBS.search(said):
             return []
         found = jobs_and_reasons(said)
         own = {
@@ -143,7 +149,7 @@ class Study:
             If a job fails.
         """
         arguments = [*self._command(), "--cores", str(cores), *self._files(), "--", *targets]
-        status = subprocess.run(arguments, cwd=self.project, env=_environment()).returncode
+        status = subprocess.run(arguments, cwd=self.project, env=_environment(self.home)).returncode
         if status:
             raise InputError("the study stopped before its end; the reason stands above")
 
@@ -162,7 +168,7 @@ class Study:
             run = subprocess.run(
                 command,
                 cwd=self.project,
-                env=_environment(),
+                env=_environment(self.home),
                 capture_output=True,
                 text=True,
                 timeout=self.most_seconds,
@@ -185,6 +191,12 @@ class Study:
         return ["--configfile", *(str(overlay) for overlay in self.overlays)]
 
 
+def settings_digest(settings: Settings) -> str:
+    """SHA-256 of complete settings, but for the names of the folders that results go to."""
+    scientific = {key: value for key, value in settings.items() if key not in _FOLDERS}
+    return hashlib.sha256(json.dumps(scientific, sort_keys=True).encode()).hexdigest()
+
+
 def jobs_and_reasons(plan: str) -> list[tuple[str, str]]:
     """Jobs of a dry run, by what they say about themselves, with Snakemake's reasons."""
     return _JOB.findall(plan)
@@ -205,13 +217,16 @@ def find_project(start: Path | None = None) -> Path:
     raise InputError(f"{start} lies in no copy of the project; go to the project's folder")
 
 
-def _environment() -> dict[str, str]:
+def _environment(home: Path | None) -> dict[str, str]:
     """Variables under which Snakemake, and the jobs that it starts, find this very library."""
+    of_user = {} if home is None else {"HOME": str(home), "XDG_CACHE_HOME": str(home / ".cache")}
     library = Path(__file__).parents[2]
     paths = [str(Path(sys.executable).parent), os.environ.get("PATH", "")]
     return {
         "NUMBA_CACHE_DIR": str(folder_of_loops(library.parent)),
         **os.environ,
+        **of_user,
+        "PYTHONSAFEPATH": "1",  # no module is taken from the folder in which Snakemake runs
         "PYTHONPATH": str(library),
         "PATH": os.pathsep.join(paths),
     }

@@ -12,6 +12,7 @@ import dataclasses
 import hashlib
 import struct
 import tempfile
+import unicodedata
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -19,6 +20,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from keystab.errors import InputError
+from keystab.provenance.bare_code import bare_digest, is_code
 from keystab.provenance.run_description import (
     ABOUT,
     LEFT_OUT,
@@ -36,10 +38,14 @@ __all__ = ["Unpacked", "committed", "require_archive", "unpacked"]
 MOST_BYTES = 500_000_000
 """Of all members together, unpacked, and of the file itself."""
 
-MOST_MEMBERS = 20_000
-_MOST_BYTES_OF_TEXT = 20_000_000
-_MOST_BYTES_OF_RECORDS = 20_000_000
-_MOST_BYTES_OF_INDEX = 200 * MOST_MEMBERS
+MOST_MEMBERS = 5_000
+_MOST_BYTES_OF_INDEX = 400 * MOST_MEMBERS
+_MOST_BYTES_OF_TEXT = 5_000_000
+_MOST_BYTES_OF_TEXTS = 20_000_000
+_MOST_BYTES_OF_FIGURE = 20_000_000
+_MOST_BYTES_OF_RECORDS = 10_000_000
+"""A finished study has a thousand members, texts of 2 MB and records of 1 MB."""
+
 _MOST_BYTES_OF_NAME, _MOST_DEPTH = 1000, 32
 _CHUNK = 1 << 20
 
@@ -62,11 +68,17 @@ class Unpacked:
     digests : mapping from str to str
         SHA-256 of every member by its name; empty where a member is damaged.
     about : About
+    bare_digests : mapping from str to str
+        Of code, which is not written: `keystab.bare_code.bare_digest` by name.
+    digest : str
+        SHA-256 of the file itself; empty for a folder.
     """
 
     folder: Path
     digests: Mapping[str, str]
     about: About
+    bare_digests: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    digest: str = ""
 
 
 def require_archive(path: Path) -> None:
@@ -102,22 +114,35 @@ def unpacked(archive: Path) -> Iterator[Unpacked]:
         names that lead out of a folder, encrypted, too big, compressed otherwise.
     """
     require_archive(archive)
-    try:
-        with archive.open("rb") as stream:
-            _check_index(stream)
-            with zipfile.ZipFile(stream) as file, tempfile.TemporaryDirectory() as name:
-                folder = Path(name)
-                members = _checked_members(file)
-                about = _about_of(file, members)
-                digests = {
-                    path: _take(file, member, folder / path if _is_data(path, about) else None)
-                    for path, member in sorted(members.items())
-                }
-                yield Unpacked(folder, digests, about)
-    except (_UnfitError, UnicodeError) as error:
-        raise InputError(f"{archive}: {error}") from None
-    except (zipfile.BadZipFile, struct.error, EOFError, NotImplementedError):
-        raise InputError(f"{archive}: not a whole zip file; get it again") from None
+    with tempfile.TemporaryDirectory() as name:
+        try:
+            held = _taken_apart(archive, Path(name))
+        except _UnfitError as error:
+            raise InputError(f"{archive}: {error}") from None
+        # Whatever else a broken file makes of its sizes and places, such as a negative one.
+        except (zipfile.BadZipFile, struct.error, EOFError, NotImplementedError, ValueError):
+            raise InputError(f"{archive}: {_BROKEN}") from None
+        yield held
+
+
+def _taken_apart(archive: Path, folder: Path) -> Unpacked:
+    with archive.open("rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        _check_index(stream)
+        with zipfile.ZipFile(stream) as file:
+            members = _checked_members(file)
+            about = _about_of(file, members)
+            _check_sizes(members, about)
+            digests = {
+                path: _take(file, member, folder / path if _is_data(path, about) else None)
+                for path, member in sorted(members.items())
+            }
+            bare = {
+                path: bare_digest(file.read(member))
+                for path, member in members.items()
+                if is_code(path) and digests[path] and member.file_size <= _MOST_BYTES_OF_TEXT
+            }
+    return Unpacked(folder, digests, about, bare, digest)
 
 
 def committed(reference: Path) -> Unpacked:
@@ -141,17 +166,28 @@ class _UnfitError(ValueError):
     """What `keystab.provenance.archive.pack` would not have written; its text says it in a line."""
 
 
+_BROKEN = "not a whole zip file; get it again"
+
+
 def _check_index(stream: IO[bytes]) -> None:
-    """Refuse an index that takes long to read, before `zipfile` reads all of it."""
+    """Refuse an index that takes long to read, before `zipfile` reads all of it.
+
+    Nothing may stand before the first member or behind the index: such a file would be something
+    else as well, such as a script.
+    """
     end = struct.Struct("<4s4H2LH")
     size = stream.seek(0, 2)
+    stream.seek(0)
+    start = stream.read(4)
     stream.seek(max(size - end.size - 20, 0))
     last = stream.read()
-    if len(last) < end.size or not last[-end.size :].startswith(b"PK\5\6"):
-        raise _UnfitError("not a whole zip file; get it again")
-    _, _, _, _, entries, index, _, _ = end.unpack(last[-end.size :])
-    if last.startswith(b"PK\6\7") or entries > MOST_MEMBERS or index > _MOST_BYTES_OF_INDEX:
+    if start != b"PK\3\4" or not last[-end.size :].startswith(b"PK\5\6"):
+        raise _UnfitError(_BROKEN)
+    _, _, _, _, entries, length, offset, comment = end.unpack(last[-end.size :])
+    if last.startswith(b"PK\6\7") or entries > MOST_MEMBERS or length > _MOST_BYTES_OF_INDEX:
         raise _UnfitError(f"holds too many files; an archive holds at most {MOST_MEMBERS}")
+    if comment or offset + length + end.size != size:
+        raise _UnfitError(_BROKEN)
     stream.seek(0)
 
 
@@ -163,12 +199,14 @@ def _checked_members(file: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
         name = member.filename
         if problem := _problem(member):
             raise _UnfitError(f"{name[:80]!a} {problem}")
-        if name.casefold() in spelled:
+        if _alike(name) in spelled:
             raise _UnfitError(f"{name[:80]!a} is there twice; make archive writes each file once")
-        spelled.add(name.casefold())
+        spelled.add(_alike(name))
         members[name] = member
+    if len(members) > MOST_MEMBERS:
+        raise _UnfitError(f"holds too many files; an archive holds at most {MOST_MEMBERS}")
     for name in members:
-        if any(str(folder).casefold() in spelled for folder in PurePosixPath(name).parents):
+        if any(_alike(str(folder)) in spelled for folder in PurePosixPath(name).parents):
             raise _UnfitError(f"{name[:80]!a} lies in a file; make archive writes none such")
     total = sum(member.file_size for member in members.values())
     if total > MOST_BYTES:
@@ -180,6 +218,29 @@ def _checked_members(file: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     if records > _MOST_BYTES_OF_RECORDS:
         raise _UnfitError(f"holds records of {in_words(records)}; those of a run take a tenth")
     return members
+
+
+def _alike(name: str) -> str:
+    """Same for names that some system takes for the same file."""
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+def _check_sizes(members: Mapping[str, zipfile.ZipInfo], about: About) -> None:
+    """Refuse more than is read in bounded time and memory."""
+    results, figures = f"{about.results}/", f"{about.figures}/"
+    texts = 0
+    for name, member in members.items():
+        texts += member.file_size * (name.startswith(results) and _is_text(name))
+        if name.startswith(figures) and member.file_size > _MOST_BYTES_OF_FIGURE:
+            raise _UnfitError(
+                f"{name[:80]!a} has {in_words(member.file_size)}; figures of a run have much less"
+            )
+    if texts > _MOST_BYTES_OF_TEXTS:
+        raise _UnfitError(f"holds tables of {in_words(texts)}; those of a run take a tenth")
+
+
+def _is_text(name: str) -> bool:
+    return PurePosixPath(name).suffix.lower() in _TEXTS
 
 
 def _problem(member: zipfile.ZipInfo) -> str:
@@ -201,7 +262,7 @@ def _problem(member: zipfile.ZipInfo) -> str:
         return "has too long a name"
     if kind not in (0, 0o100000):
         return "is a link or a device; make archive writes files only"
-    if PurePosixPath(name).suffix in _TEXTS and member.file_size > _MOST_BYTES_OF_TEXT:
+    if _is_text(name) and member.file_size > _MOST_BYTES_OF_TEXT:
         return f"has {in_words(member.file_size)}; tables and texts of a run have much less"
     if member.flag_bits & 0x2041:
         return "is encrypted; make archive encrypts nothing"

@@ -8,6 +8,8 @@ REPRODUCING.md.
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import os
 import shutil
 import tempfile
@@ -16,10 +18,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from keystab.errors import InputError
-from keystab.io.checksums import read_sums
 from keystab.io.checksums import verify as verify_seal
 from keystab.provenance.archive import about_study, is_final
-from keystab.provenance.archived_settings import place_settings
+from keystab.provenance.archive_contents import check_contents, check_sources
+from keystab.provenance.archived_settings import differing, place_settings, settings_of
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.result_checks import (
     Check,
@@ -31,6 +33,8 @@ from keystab.provenance.result_checks import (
     check_reference,
     check_verdicts,
     left_out_digests,
+    left_out_rows,
+    listed_in,
 )
 from keystab.provenance.run_description import ABOUT, LEFT_OUT, SUMS
 from keystab.provenance.snakemake_records import (
@@ -40,14 +44,15 @@ from keystab.provenance.snakemake_records import (
     read_records,
     upstream,
 )
-from keystab.provenance.study_folder import Study
-from keystab.provenance.unpacking import Unpacked, unpacked
+from keystab.provenance.study_folder import Output, Study
+from keystab.provenance.unpacking import Unpacked, committed
+from keystab.study.settings import Settings
 
 __all__ = ["check_archive", "check_here", "check_reference_itself", "copy_workflow", "report"]
 
-_MOST_NAMED = 10
+_MOST_NAMED, _MOST_LETTERS = 10, 400
 _WORKFLOW = ("Snakefile", "environment.lock", "workflow", "profiles", "config")
-_MOST_SECONDS = 120.0
+_MOST_SECONDS = 60.0
 
 
 def report(checks: Sequence[Check]) -> str:
@@ -77,16 +82,17 @@ def report(checks: Sequence[Check]) -> str:
 
 
 def _harmless(line: str) -> str:
-    return "".join(it if it.isprintable() else "?" for it in line)
+    shown = line if len(line) <= _MOST_LETTERS else f"{line[:_MOST_LETTERS]} ..."
+    return "".join(it if it.isprintable() else "?" for it in shown)
 
 
-def check_archive(archive: Path, project: Path) -> tuple[list[Check], bool]:
+def check_archive(held: Unpacked, project: Path) -> tuple[list[Check], bool]:
     """Check an archive against a copy of the project, without computing anything but verdicts.
 
     Parameters
     ----------
-    archive : path
-        What `keystab.provenance.archive.pack` wrote.
+    held : Unpacked
+        What `keystab.provenance.archive.pack` wrote, taken apart.
     project : path
         The copy, whose code, settings and lock the archive is held against.
 
@@ -99,40 +105,58 @@ def check_archive(archive: Path, project: Path) -> tuple[list[Check], bool]:
     Raises
     ------
     InputError
-        If it is no archive of this study and version, or not one that `pack` writes.
+        If its lists, records or settings are not what `pack` packs.
     """
-    with unpacked(archive) as held:
-        try:
-            run = _run_of(held)
-            lock = file_digest(project / "environment.lock")
-            checks = [
-                check_digests(_listed(held.folder), held.digests),
-                _check_sources(held, project),
-                check_final(run),
-                check_figures(run, lock),
-                check_inputs(run, {**left_out_digests(held.folder), **held.digests}),
-                check_columns(run),
-                check_verdicts(run, project / "config/claims.yaml", alike(run.about, lock)),
-                *check_reference(run, project / "results/reference", lock),
-                check_nothing_to_do(held, run, project),
-            ]
-        except InputError as error:
-            raise InputError(f"{archive}: {error}") from None
+    lock = file_digest(project / "environment.lock")
+    settings = settings_of(held, project)
+    # What the settings are, their files say.
+    about = dataclasses.replace(held.about, settings=settings.digest)
+    run = _run_of(held)._replace(about=about)
+    left_out = left_out_rows(held.folder)
+    elsewhere = {name: row["sha256"] for name, row in left_out.items()}
+    checks = [
+        check_digests(_listed(held.folder), held.digests),
+        check_sources(held, project),
+        check_contents(held, run, left_out),
+        _check_description(held, settings.digest, lock, project),
+        check_final(run),
+        check_figures(run, lock),
+        check_inputs(run, elsewhere),
+        check_columns(run),
+        check_verdicts(run, project / "config/claims.yaml", alike(about, lock)),
+        *_check_reference(run, project, lock, settings.complete),
+        check_nothing_to_do(held, run, project),
+    ]
     return checks, not any(check.problems for check in checks)
 
 
 def _run_of(held: Unpacked) -> Run:
     """The run that an archive holds; its records were checked one by one."""
     about = held.about
-    places = (about.results, about.figures)
-    return Run(held.folder, about, read_foreign_records(held.folder, places))
+    records = read_foreign_records(held.folder, (about.results, about.figures))
+    return Run(held.folder, about, records, held.digests)
+
+
+def _check_description(held: Unpacked, settings: str, lock: str, project: Path) -> Check:
+    """Ask whether the archive is of the lock file here, and of the settings that it names."""
+    about, config = held.about, "config/config.yaml"
+    given = {ABOUT: about.lock, "environment.lock": held.digests.get("environment.lock")}
+    problems = [
+        f"{name}: another environment.lock than is here"
+        for name, digest in given.items()
+        if digest != lock
+    ]
+    same_config = held.digests.get(config) == file_digest(project / config)
+    if same_config and about.settings != settings:
+        problems.append(f"{ABOUT}: names other settings than its files of settings are")
+    return Check("description", "of the lock file here, and of the settings in here", problems)
 
 
 def _listed(folder: Path) -> dict[str, str]:
     try:
-        return read_sums((folder / SUMS).read_text(encoding="utf-8"))
-    except UnicodeError:
-        raise InputError(f"{SUMS} is no list of digests; get it again") from None
+        return listed_in(folder / SUMS)
+    except InputError as error:
+        raise InputError(f"{SUMS} {error}; get the archive again") from None
 
 
 def check_digests(listed: Mapping[str, str], found: Mapping[str, str]) -> Check:
@@ -153,6 +177,17 @@ def check_digests(listed: Mapping[str, str], found: Mapping[str, str]) -> Check:
     return Check("digests", f"{len(listed)} files as listed in {SUMS}", problems)
 
 
+def _check_reference(run: Run, project: Path, lock: str, settings: Settings) -> list[Check]:
+    """Compare with the committed reference, and say in which settings it was another run."""
+    reference = project / "results/reference"
+    other: list[str] = []
+    with contextlib.suppress(InputError):
+        its = settings_of(committed(reference), project).complete
+        folders = ("results", "figures", "logs")
+        other = [it for it in differing(its, settings) if it not in folders]
+    return check_reference(run, reference, lock, other)
+
+
 def check_reference_itself(reference: Path) -> Check:
     """Hold the files of the committed reference against its own list of digests."""
     found = {
@@ -161,25 +196,6 @@ def check_reference_itself(reference: Path) -> Check:
         if path.is_file()
     }
     return check_digests(_listed(reference), found)
-
-
-def _check_sources(held: Unpacked, project: Path) -> Check:
-    """Say which sources differ; whether that matters, Snakemake says."""
-    names = sorted(name for name in held.digests if name.split("/")[0] in ("src", *_WORKFLOW))
-    other = [
-        name
-        for name in names
-        if not (project / name).is_file() or file_digest(project / name) != held.digests[name]
-    ]
-    words = f"{len(names) - len(other)} of {len(names)} files of code and settings are those here"
-    named = ", ".join(other[:_MOST_NAMED]) + (" and more" if len(other) > _MOST_NAMED else "")
-    told = [f"not the same here: {named}; whether it matters, the next lines say"] * bool(other)
-    told += [
-        f"{name}: a page that nothing checks; opened in a browser, it can run what its writer wants"
-        for name in sorted(held.digests)
-        if name.endswith(".html")
-    ]
-    return Check("sources", words, notes=told)
 
 
 def check_nothing_to_do(held: Unpacked, run: Run, project: Path) -> Check:
@@ -200,7 +216,7 @@ def check_nothing_to_do(held: Unpacked, run: Run, project: Path) -> Check:
         (scratch / ".snakemake/incomplete").mkdir(parents=True, exist_ok=True)
         _age(scratch, run.records)
         try:
-            todo = Study(scratch, overlays, most_seconds=_MOST_SECONDS).to_do()
+            todo = Study(scratch, overlays, most_seconds=_MOST_SECONDS, home=scratch).to_do()
         except InputError as error:
             todo = [str(error).replace(f"{scratch}/", "")]
     return Check("workflow", "snakemake --dry-run has nothing to do after unpacking", todo)
@@ -269,6 +285,7 @@ def check_here(study: Study) -> tuple[list[Check], bool]:
     checks = [
         Check("results", f"{len(final)} figures, tables and verdicts are there", missing),
         Check("workflow", f"{len(outputs)} files up to date", todo),
+        _check_records(outputs, run),
         check_inputs(run, left_out),
         _check_stores(mine, project),
         check_final(run),
@@ -279,8 +296,19 @@ def check_here(study: Study) -> tuple[list[Check], bool]:
     reference = project / "results/reference"
     if reference.is_dir():
         checks.append(check_reference_itself(reference))
-        checks += check_reference(run, reference, study.lock_digest)
+        checks += _check_reference(run, project, study.lock_digest, study.settings)
     return checks, not any(check.problems for check in checks)
+
+
+def _check_records(outputs: Sequence[Output], run: Run) -> Check:
+    """Ask whether Snakemake knows what made each finished file; else it would not check it."""
+    there = [it.path for it in outputs if not it.pending and (run.folder / it.path).exists()]
+    problems = [
+        f"{path}: no record of what made it; `snakemake --force {path}` makes it again"
+        for path in there
+        if path not in run.records
+    ]
+    return Check("records", f"{len(run.records)} of what made the files", problems)
 
 
 def _by_reason(study: Study, pending: int, n_outputs: int) -> list[str]:
@@ -317,14 +345,10 @@ def check_inputs(run: Run, elsewhere: Mapping[str, str] | None = None) -> Check:
             digests.setdefault(name, set()).add(digest)
     problems = []
     for name, expected in sorted(digests.items()):
-        if (run.folder / name).is_file():
-            found = file_digest(run.folder / name)
-        elif name in elsewhere:
-            found = elsewhere[name]
-        else:
+        found = run.digest(name) or elsewhere.get(name)
+        if found is None:
             problems.append(f"{name}: missing" + again.format(name))
-            continue
-        if {found} != expected:
+        elif {found} != expected:
             problems.append(f"{name}: not as it was when others were made from it")
     return Check("inputs", f"{len(digests)} as they were when others were made from them", problems)
 

@@ -94,6 +94,11 @@ def _octaves_problems(settings: Settings) -> list[str]:
     return []
 
 
+def every_set(settings: Settings) -> Settings:
+    """Sets of views by name; each value of a sweep is a set of its own."""
+    return expanded(settings.get("sets", {}))
+
+
 def setting_problems(settings: Settings) -> list[str]:
     """One line for every pair of settings that contradict each other; sweeps are expanded."""
     problems = [
