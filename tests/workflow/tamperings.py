@@ -221,6 +221,22 @@ def everywhere() -> Iterator[Tampering]:
             f"other settings recorded: {name}", recorded(name, params=["seed = 9"]), (job,)
         )
         yield Tampering(f"other inputs recorded: {name}", recorded(name, input=["x"]), (job,))
+    nothing = "\nNothing to be done (all requested files are present and up to date)."
+    yield Tampering(
+        "a record that says that nothing is to be done",
+        recorded(PDFS[0], params=[nothing]),
+        ("Drawing",),
+    )
+    yield Tampering(
+        "a record of a format that Snakemake does not hold against anything",
+        recorded(PDFS[0], params=["seed = 9"], record_format_version=0),
+        ("figures/fig1.pdf: no whole record|not a record of Snakemake",),
+    )
+    yield Tampering(
+        "a log whose name hides other lines",
+        recorded(PDFS[0], params=["seed = 9"], log=['"x\tok\tno update\n"']),
+        ("records damaged|not a record of Snakemake",),
+    )
     yield Tampering(
         "another digest recorded", input_digest(PDFS[0], TABLES[0]), (TABLES[0],), quick=True
     )
@@ -410,6 +426,19 @@ def table_changed(
     return lambda files: with_passports(judged(in_one(name, edit)(files), claims))
 
 
+def with_more(files: Files) -> Files:
+    """Add a figure that the study does not draw, with a record and all digests."""
+    name = "figures/fig9.png"
+    drawn = with_passports(files, figure="fig9", code=None)[PNGS[0]]
+    files = forged(files) | {name: drawn, record_of(name): files[record_of(PNGS[0])]}
+    digest = hashlib.sha256(drawn).hexdigest()
+    files[LIST] += f"{digest}  {name}\n".encode()
+    record = json.loads(files[record_of(LIST)])
+    record["input"].append(name)
+    record["input_checksums"][name] = f"sha256:{digest}"
+    return files | {record_of(LIST): json.dumps(record).encode()}
+
+
 def forgeries(claims: str) -> Iterator[Tampering]:
     """Changes after which all digests and records were rewritten."""
     one, other = TABLES
@@ -467,7 +496,8 @@ def forgeries(claims: str) -> Iterator[Tampering]:
                     table_changed(name, edit, claims),
                     (PurePosixPath(name).name,),
                 )
-            yield f"{name} changed alone", in_one(name, another_number), (name,)
+            base = PurePosixPath(name).name
+            yield f"{name} changed alone", in_one(name, another_number), (f"another {base}",)
         yield (
             "a column that does not follow",
             table_changed(other, lambda data: data.replace(b"0.5,2.0,1.0", b"0.5,2.0,1.5"), claims),
@@ -481,6 +511,7 @@ def forgeries(claims: str) -> Iterator[Tampering]:
         yield "a table lost", without(one), (one,)
         yield "a figure lost", without(PNGS[1]), PNGS[1:]
 
+    yield Tampering("forged: a figure more", with_more, ("figures/fig9.png",))
     for name, change, named in changes():
         yield Tampering(
             f"forged: {name}",

@@ -39,11 +39,6 @@ def check_sources(held: Unpacked, project: Path) -> Check:
     words = f"{len(names) - len(other)} of {len(names)} files of code and settings are those here"
     named = ", ".join(other[:_MOST_NAMED]) + (" and more" if len(other) > _MOST_NAMED else "")
     told = [f"not the same here: {named}; whether it matters, the next lines say"] * bool(other)
-    told += [
-        f"{name}: a page that nothing checks; opened in a browser, it can run what its writer wants"
-        for name in sorted(held.digests)
-        if name.endswith(".html")
-    ]
     return Check("sources", words, problems, told)
 
 
@@ -88,7 +83,13 @@ def check_contents(held: Unpacked, run: Run, left_out: Mapping[str, Mapping[str,
         if {row["sha256"]} != expected or row["rule"] != rule or not row["bytes"].isdecimal():
             problems.append(f"{name}: {LEFT_OUT} says otherwise than the records of the run")
     words = f"{len(held.digests)} files that a run packs, {len(left_out)} others left out"
-    return Check("contents", words, problems)
+    told = [
+        f"{name}: nothing checks what it says"
+        + ("; opened in a browser, it can run what its writer wants" * name.endswith(".html"))
+        for name in sorted(held.digests)
+        if _asked_for(name, run)
+    ]
+    return Check("contents", words, problems, told)
 
 
 def _digests_of_inputs(records: Mapping[str, Record]) -> dict[str, set[str]]:

@@ -15,7 +15,7 @@ from keystab.io.figure_metadata import PNG_KEY, FigureMetadata
 from keystab.provenance.code_digest import fingerprint
 from keystab.provenance.snakemake_records import Record, read_records, settings_behind, upstream
 
-__all__ = ["code_of_figure", "file_digest", "read_figure_metadata", "whence"]
+__all__ = ["code_of_figure", "file_digest", "printable", "read_figure_metadata", "whence"]
 
 _SHORT = 12
 _MOST_PIXELS = 100_000_000
@@ -137,7 +137,21 @@ def whence(path: Path | str, project: Path) -> str:
     InputError
         As `read_figure_metadata`.
     """
-    path = Path(path)
+    return "\n".join(map(printable, _told(Path(path), project)))
+
+
+def printable(text: str) -> str:
+    r"""Text without what a terminal would obey.
+
+    Examples
+    --------
+    >>> printable("fig1\x1b[2J.png")
+    'fig1?[2J.png'
+    """
+    return "".join(it if it.isprintable() else "?" for it in text)
+
+
+def _told(path: Path, project: Path) -> list[str]:
     metadata = read_figure_metadata(path)
     records = read_records(project)
     drawn = _record_of(path, metadata, records, project)
@@ -150,7 +164,7 @@ def whence(path: Path | str, project: Path) -> str:
         lines.append(f"  {table}  {digest}  {_state(project / table, digest)}")
     if drawn is None:
         lines += ["", "the records of Snakemake here know no such figure, nor what lies behind it"]
-        return "\n".join([*lines, "", "to make it again", f"  make figures/{metadata.figure}.pdf"])
+        return [*lines, "", "to make it again", f"  make figures/{metadata.figure}.pdf"]
     chain = upstream(records, [drawn.output])
     behind = [record for record in chain if record is not drawn]
     lines += ["", "which were made from, and these in turn from"]
@@ -159,7 +173,7 @@ def whence(path: Path | str, project: Path) -> str:
     lines += ["", f"settings behind it ({len(settings)})"]
     lines += [f"  {name} = {value}" for name, value in settings.items()]
     lines += ["", "drawn with", f"  {drawn.command}", "", "to make it again, with all behind it"]
-    return "\n".join([*lines, *(f"  {line}" for line in _commands(drawn.output, project))])
+    return [*lines, *(f"  {line}" for line in _commands(drawn.output, project))]
 
 
 def _identity(metadata: FigureMetadata, project: Path) -> Iterator[str]:

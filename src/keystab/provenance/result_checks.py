@@ -14,10 +14,9 @@ import re
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from keystab.errors import InputError
-from keystab.io.figure_metadata import FigureMetadata
 from keystab.provenance import table_differences
 from keystab.provenance.column_relations import broken_relations
 from keystab.provenance.lineage import code_of_figure, file_digest, read_figure_metadata
@@ -211,7 +210,7 @@ def check_figures(run: Run, lock: str) -> Check:
             problems.append(f"{name}: is figure {passport.figure}")
         if passport.version != run.about.keystab:
             problems.append(f"{name}: drawn by another version, {passport.version[:20]!a}")
-        if passport.code != code[passport.figure]:
+        if passport.code is None or passport.code != code[passport.figure]:
             problems.append(f"{name}: drawn by other code than is here")
         if passport.lock != lock:
             problems.append(f"{name}: drawn under another environment.lock than is here")
@@ -246,7 +245,8 @@ def check_verdicts(run: Run, claims: Path, exact: bool) -> Check:
     if not claims.is_file():
         return Check("verdicts", "there are no claims here to judge")
     folder = run.folder / run.about.results
-    problems = [f"{name}: missing" for name in _VERDICTS if not (folder / name).is_file()]
+    places = {name: f"{run.about.results}/{name}" for name in _VERDICTS}
+    problems = [f"{it}: missing" for name, it in places.items() if not (folder / name).is_file()]
     if problems:
         return Check("verdicts", "", problems)
     try:
@@ -262,11 +262,10 @@ def check_verdicts(run: Run, claims: Path, exact: bool) -> Check:
             for path in again:
                 if path.read_bytes() == (folder / path.name).read_bytes():
                     continue
-                place = f"{run.about.results}/{path.name}"
                 told = list(_other_verdicts(verdicts_in(folder / path.name), verdicts_in(path)))
                 if not told and (exact or not _but_for_rounding(folder / path.name, path)):
                     told = ["other numbers or words than its tables give"]
-                problems += [f"{place}: {it}" for it in told]
+                problems += [f"{places[path.name]}: {it}" for it in told]
     except InputError as error:
         return Check("verdicts", "", [str(error).replace(f"{run.folder}/", "")])
     except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
@@ -318,26 +317,25 @@ def verdicts_in(path: Path) -> dict[str, str]:
     try:
         text = path.read_text(encoding="utf-8")
         found = list(_VERDICTS_OF[path.suffix](text))
-    except (ValueError, TypeError, KeyError, LookupError, csv.Error, RecursionError):
-        raise InputError(f"{path}: is no ledger of claims") from None
-    verdicts = dict(found)
-    known = all(isinstance(it, str) for pair in found for it in pair)
-    if not known or len(verdicts) < len(found):
+    except (ValueError, TypeError, LookupError, csv.Error, RecursionError):
+        found = [("", None)]
+    texts = all(isinstance(it, str) for pair in found for it in pair)
+    if not texts or len({name for name, _ in found}) < len(found):
         raise InputError(f"{path}: is no ledger of claims")
-    return verdicts
+    return dict(found)
 
 
-def _verdicts_of_csv(text: str) -> Iterator[tuple[str, str]]:
+def _verdicts_of_csv(text: str) -> Iterator[tuple[Any, Any]]:
     for row in csv.DictReader(io.StringIO(text, newline=""), strict=True):
         yield row["id"], row["verdict"]
 
 
-def _verdicts_of_json(text: str) -> Iterator[tuple[str, str]]:
+def _verdicts_of_json(text: str) -> Iterator[tuple[Any, Any]]:
     for row in json.loads(text):
         yield row["id"], row["verdict"]
 
 
-def _verdicts_of_markdown(text: str) -> Iterator[tuple[str, str]]:
+def _verdicts_of_markdown(text: str) -> Iterator[tuple[Any, Any]]:
     verdict = ""
     for line in text.split("\n"):
         if line.startswith("## "):
@@ -459,40 +457,33 @@ def compare_verdicts(reference: Path, results: Path) -> Check:
 def _compare_pictures(run: Run, reference: Path, about: About, exact: bool) -> Check:
     """Compare figures with those of the reference that the same code drew."""
     digests = {PurePosixPath(name).name: it for name, it in left_out_digests(reference).items()}
-    problems, same = [], 0
-    compared = [
-        path for path in run.figures if (reference / "figures" / f"{path.stem}.png").is_file()
-    ]
-    by_other_code = 0
-    for path in compared:
+    exact = exact and about.zlib == run.about.zlib
+    problems, not_compared = [], 0
+    for path in run.figures:
         expected = reference / "figures" / f"{path.stem}.png"
         try:
             mine = read_figure_metadata(path, as_drawn=True)
             its = read_figure_metadata(expected, as_drawn=True)
         except InputError:
-            continue  # said by check_figures
-        if (mine.code, mine.lock) != (its.code, its.lock):
-            by_other_code += 1
+            not_compared += 1
             continue
-        told = ""
-        if path.suffix == ".png":
-            told = _other_pixels(path, expected, _same_tables(mine, its))
-        elif _same_tables(mine, its) and exact and about.zlib and about.zlib == run.about.zlib:
-            known = digests.get(path.name)
-            told = "" if known in (None, run.digest(run.name(path))) else "other bytes"
+        alike = (mine.tables, mine.settings) == (its.tables, its.settings)
+        told: str | None = None
+        if (mine.code, mine.lock) == (its.code, its.lock):
+            digest = run.digest(run.name(path))
+            if path.suffix == ".png":
+                same = digest == file_digest(expected)
+                told = "" if same else _other_pixels(path, expected, alike)
+            elif alike and exact and path.name in digests:
+                told = "" if digest == digests[path.name] else "other bytes"
         if told:
             problems.append(f"{run.name(path)}: not as in results/reference: {told}")
-        else:
-            same += 1
-    words = f"{same} of {len(run.figures)} as in results/reference"
-    notes = [f"{by_other_code} were drawn there by other code, and not compared"] * bool(
-        by_other_code
-    )
+        not_compared += told is None
+    compared = len(run.figures) - not_compared
+    words = f"{compared - len(problems)} of {compared} as in results/reference"
+    why = "drawn there by other code or from other tables, or on another machine, or not at all"
+    notes = [f"{not_compared} not compared: {why}"] * bool(not_compared)
     return Check("pictures", words, problems, notes)
-
-
-def _same_tables(one: FigureMetadata, other: FigureMetadata) -> bool:
-    return (one.tables, one.settings) == (other.tables, other.settings)
 
 
 def _other_pixels(path: Path, expected: Path, same_tables: bool) -> str:
@@ -511,10 +502,12 @@ def _other_pixels(path: Path, expected: Path, same_tables: bool) -> str:
         return "cannot be read"
     distance = np.abs(a - b).max(axis=2)
     if same_tables:
-        share = float((distance > 0).mean())
-        return f"{share:.1%} of its pixels differ" if share else ""
-    share = float((distance > _GREY_LEVELS).mean())
-    return f"{share:.1%} of its pixels differ clearly" if share > _SHARE_OF_PIXELS else ""
+        n = int((distance > 0).sum())
+        return f"{n} of its {distance.size} pixels differ" if n else ""
+    n = int((distance > _GREY_LEVELS).sum())
+    if n <= _SHARE_OF_PIXELS * distance.size:
+        return ""
+    return f"{n} of its {distance.size} pixels differ clearly"
 
 
 def left_out_rows(folder: Path) -> dict[str, dict[str, str]]:

@@ -32,14 +32,15 @@ FOLDER = Path(".snakemake/metadata")
 """Where the records lie, within the project's folder."""
 
 _MOST_BYTES = 5_000_000
-_TEXT_OR_NONE, _NUMBER_OR_NONE = (str, type(None)), (int, float, type(None))
+_OLDEST_FORMAT = 6
+"""Of records, by which Snakemake notices all that it can notice."""
+
 _TYPES: Mapping[str, tuple[type, ...]] = {
-    "rule": (str,), "input": (list,), "log": (list,), "shellcmd": _TEXT_OR_NONE,
-    "params": (list,), "code": _TEXT_OR_NONE, "record_format_version": (int,),
-    "conda_env": _TEXT_OR_NONE, "container_img_url": _TEXT_OR_NONE,
-    "software_stack_hash": _TEXT_OR_NONE, "job_hash": (int,), "starttime": _NUMBER_OR_NONE,
-    "endtime": _NUMBER_OR_NONE, "incomplete": (bool,), "external_jobid": (type(None),),
-    "input_checksums": (dict, type(None)),
+    "rule": (str,), "input": (list,), "log": (list,), "shellcmd": (str,), "params": (list,),
+    "code": (str,), "record_format_version": (int,), "conda_env": (str, type(None)),
+    "container_img_url": (str, type(None)), "software_stack_hash": (str,), "job_hash": (int,),
+    "starttime": (int, float), "endtime": (int, float), "incomplete": (bool,),
+    "external_jobid": (str, type(None)), "input_checksums": (dict,),
 }  # fmt: skip
 """What Snakemake writes, and as what; of a stranger's record nothing else is kept."""
 
@@ -107,6 +108,11 @@ class Record:
         }
         return json.dumps({**self.fields, **changed}, sort_keys=True)
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is as Snakemake writes it; of others, it would not notice what changed."""
+        return _typed(self.fields)
+
 
 def read_records(project: Path) -> dict[str, Record]:
     """Read all records of a project by the path of their output; sorted, possibly none.
@@ -164,7 +170,7 @@ def read_foreign_records(folder: Path, results: Iterable[str]) -> dict[str, Reco
             raise InputError(f"{name}: not a record of Snakemake") from None
         if not _typed(kept) or path != _place(output):
             raise InputError(f"{name}: not a record of Snakemake")
-        checksums = kept["input_checksums"] or {}
+        checksums = kept["input_checksums"]
         if not output.startswith(places) or _leads_out(output) or output in records:
             raise InputError(f"{name}: records {output[:80]!a}, which is no result of this run")
         if outside := [it for it in (*kept["input"], *checksums) if _leads_out(it)]:
@@ -186,15 +192,20 @@ def place_records(records: Mapping[str, Record], project: Path) -> None:
 
 def _typed(fields: Mapping[str, Any]) -> bool:
     """Whether the fields of a record have the types that Snakemake gives them."""
-    if fields["incomplete"] or not all(
-        isinstance(fields[key], kinds) and isinstance(fields[key], bool) == (bool in kinds)
+    if not all(
+        isinstance(fields.get(key), kinds) and isinstance(fields[key], bool) == (bool in kinds)
         for key, kinds in _TYPES.items()
     ):
         return False
-    digests = (fields["input_checksums"] or {}).values()
-    texts = (*fields["params"], *fields["log"], *fields["input"], *digests)
-    times = (fields["starttime"] or 0, fields["endtime"] or 0)
-    return all(isinstance(it, str) for it in texts) and all(abs(it) < 1e12 for it in times)
+    names = (fields["rule"], *fields["log"])
+    texts = (*names, *fields["params"], *fields["input"], *fields["input_checksums"].values())
+    return (
+        all(isinstance(it, str) for it in texts)
+        and all(it.isprintable() for it in names)
+        and all(abs(fields[key]) < 1e12 for key in ("starttime", "endtime"))
+        and fields["record_format_version"] >= _OLDEST_FORMAT
+        and not fields["incomplete"]
+    )
 
 
 def _place(output: str) -> str:

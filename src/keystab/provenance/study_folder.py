@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import hashlib
 import json
@@ -22,6 +21,7 @@ from keystab.study.settings import Settings, checked, read_yaml
 __all__ = ["Output", "Study", "find_project", "jobs_and_reasons", "settings_digest"]
 
 _FOLDERS = ("results", "figures", "logs")
+_SUMMARY = ["output_file", "date", "rule", "log-file(s)", "status", "plan"]
 _JOB = re.compile(r"^Job \d+: (.*)\n *[Rr]eason: (.*)$", re.MULTILINE)
 _NOTHING = re.compile("^Nothing to be done", re.MULTILINE)
 _JOBS = re.compile("^Job stats:", re.MULTILINE)
@@ -99,16 +99,20 @@ class Study:
             If Snakemake cannot plan the study.
         """
         said = self.snakemake("--summary", output_only=True)
-        rows = csv.DictReader(said.splitlines(), delimiter="\t")
+        # Names of logs are from records, which a stranger may have written to hide other lines.
+        rows = [line.split("\t") for line in said.split("\n") if line]
+        start = rows.index(_SUMMARY) + 1 if _SUMMARY in rows else 0
+        if not start or any(len(row) != len(_SUMMARY) for row in rows[start:]):
+            raise InputError("snakemake --summary is not readable; are its records damaged?")
         outputs = [
             Output(
-                row["output_file"],
-                row["rule"],
-                tuple(log for log in row["log-file(s)"].split(",") if log != "-"),
-                row["status"],
-                row["plan"] != "no update",
+                path,
+                rule,
+                tuple(log for log in logs.split(",") if log != "-"),
+                status,
+                plan != "no update",
             )
-            for row in rows
+            for path, _, rule, logs, status, plan in rows[start:]
         ]
         return sorted(outputs, key=lambda output: output.path)
 

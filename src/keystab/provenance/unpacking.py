@@ -131,6 +131,7 @@ def _taken_apart(archive: Path, folder: Path) -> Unpacked:
         _check_index(stream)
         with zipfile.ZipFile(stream) as file:
             members = _checked_members(file)
+            _check_places(stream, file)
             about = _about_of(file, members)
             _check_sizes(members, about)
             digests = {
@@ -220,6 +221,20 @@ def _checked_members(file: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     return members
 
 
+def _check_places(stream: IO[bytes], file: zipfile.ZipFile) -> None:
+    """Refuse a file in which something lies between the members, where other programs see it."""
+    head = struct.Struct("<26x2H")
+    place = 0
+    for member in sorted(file.infolist(), key=lambda it: it.header_offset):
+        stream.seek(place)
+        name, more = head.unpack(stream.read(head.size))
+        if member.header_offset != place or more:
+            raise _UnfitError(_BROKEN)
+        place += head.size + name + member.compress_size
+    if place != file.start_dir:
+        raise _UnfitError(_BROKEN)
+
+
 def _alike(name: str) -> str:
     """Same for names that some system takes for the same file."""
     return unicodedata.normalize("NFC", name).casefold()
@@ -260,8 +275,10 @@ def _problem(member: zipfile.ZipInfo) -> str:
         return "has too long a name"
     if any(len(part.encode()) > 255 for part in parts):
         return "has too long a name"
-    if kind not in (0, 0o100000):
+    if kind not in (0, 0o100000) or member.external_attr >> 16 & 0o7000:
         return "is a link or a device; make archive writes files only"
+    if member.extra or member.comment:
+        return "has more fields than make archive writes"
     if _is_text(name) and member.file_size > _MOST_BYTES_OF_TEXT:
         return f"has {in_words(member.file_size)}; tables and texts of a run have much less"
     if member.flag_bits & 0x2041:

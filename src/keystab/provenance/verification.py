@@ -22,7 +22,7 @@ from keystab.io.checksums import verify as verify_seal
 from keystab.provenance.archive import about_study, is_final
 from keystab.provenance.archive_contents import check_contents, check_sources
 from keystab.provenance.archived_settings import differing, place_settings, settings_of
-from keystab.provenance.lineage import file_digest
+from keystab.provenance.lineage import file_digest, printable
 from keystab.provenance.result_checks import (
     Check,
     Run,
@@ -78,12 +78,7 @@ def report(checks: Sequence[Check]) -> str:
         lines += [f"          {problem}" for problem in shown]
         lines += [f"          and {more} more"] * (more > 0)
         lines += [f"          note: {note}" for note in check.notes]
-    return "\n".join(map(_harmless, lines))
-
-
-def _harmless(line: str) -> str:
-    shown = line if len(line) <= _MOST_LETTERS else f"{line[:_MOST_LETTERS]} ..."
-    return "".join(it if it.isprintable() else "?" for it in shown)
+    return "\n".join(printable(it[:_MOST_LETTERS]) for it in lines)
 
 
 def check_archive(held: Unpacked, project: Path) -> tuple[list[Check], bool]:
@@ -216,7 +211,11 @@ def check_nothing_to_do(held: Unpacked, run: Run, project: Path) -> Check:
         (scratch / ".snakemake/incomplete").mkdir(parents=True, exist_ok=True)
         _age(scratch, run.records)
         try:
-            todo = Study(scratch, overlays, most_seconds=_MOST_SECONDS, home=scratch).to_do()
+            study = Study(scratch, overlays, most_seconds=_MOST_SECONDS, home=scratch)
+            outputs = study.outputs()
+            todo = study.to_do() if any(output.pending for output in outputs) else []
+            made = {output.path for output in outputs}
+            todo += [f"{it}: not made by this study" for it in run.records if it not in made]
         except InputError as error:
             todo = [str(error).replace(f"{scratch}/", "")]
     return Check("workflow", "snakemake --dry-run has nothing to do after unpacking", todo)
@@ -297,16 +296,25 @@ def check_here(study: Study) -> tuple[list[Check], bool]:
     if reference.is_dir():
         checks.append(check_reference_itself(reference))
         checks += _check_reference(run, project, study.lock_digest, study.settings)
-    return checks, not any(check.problems for check in checks)
+    return [_once(check, missing) for check in checks], not any(it.problems for it in checks)
+
+
+def _once(check: Check, missing: Sequence[str]) -> Check:
+    """Do not say again what is missing."""
+    known = tuple(f"{told.partition(':')[0]}: missing" for told in missing)
+    other = [told for told in check.problems if told in missing or not told.startswith(known)]
+    if n := len(check.problems) - len(other):
+        other.append(f"{n} missing, as said above")
+    return dataclasses.replace(check, problems=other)
 
 
 def _check_records(outputs: Sequence[Output], run: Run) -> Check:
     """Ask whether Snakemake knows what made each finished file; else it would not check it."""
     there = [it.path for it in outputs if not it.pending and (run.folder / it.path).exists()]
     problems = [
-        f"{path}: no record of what made it; `snakemake --force {path}` makes it again"
+        f"{path}: no whole record of what made it; `snakemake --force {path}` makes it again"
         for path in there
-        if path not in run.records
+        if path not in run.records or not run.records[path].is_whole
     ]
     return Check("records", f"{len(run.records)} of what made the files", problems)
 
