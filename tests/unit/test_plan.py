@@ -57,6 +57,8 @@ def test_a_resolved_set_says_what_null_stands_for():
     assert sets["unknown_blur_0p4"]["assumed_blur"] == 0.7
     assert sets["translations"]["assumed_blur"] is None
     assert sets["blur_errors"]["assumed_blur"] == 0.7
+    # A set that is not searched may spread from several blurs.
+    assert study("{sets: {examples: {blur_spread: 0.1}}}")["sets"]["examples"]["blur"][0] == 0.5
 
 
 def test_a_sweep_is_its_sets_with_their_values():

@@ -43,13 +43,13 @@ class Files(dict):
 def test_a_stage_is_given_its_settings_one_by_one_under_their_names():
     parameters = RULES.stage("detect", Detection, n_spo="{n_spo}", oversampling="cosine")
     wildcards = {**THERE, "n_spo": "15"}
+    assert parameters["n_spo"](wildcards, Files()) == "15"  # for messages
     given_ = {name: parameters[name](wildcards) for name in parameters if name not in DERIVED}
     assert {repr(value) for value in given_.values()} == {
         "detector.sigma_min = 1.1",
         "detector.kappa = 1.5",
         "detector.oversampling = cosine",  # another value under the name of the setting
         "detector.epsilon = 0",
-        "n_spo = 15",
         "code of keystab.stages.detect = of keystab.stages.detect",
         "environment.lock = lock",
     }
@@ -63,12 +63,12 @@ def test_a_stage_is_given_its_settings_one_by_one_under_their_names():
     ]
 
 
-DERIVED = ("command", "scene")
-"""Made from input or output, and so not compared by Snakemake."""
+DERIVED = ("command", "scene", "n_spo")
+"""Made from input or output, or said by the path of the output: not compared by Snakemake."""
 
 
 def test_what_snakemake_must_not_compare_takes_input():
-    parameters = RULES.stage("detect", Detection)
+    parameters = RULES.stage("detect", Detection, n_spo="{n_spo}")
     for name, function in parameters.items():
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         assert ("input" in names) is (name in DERIVED), name

@@ -216,11 +216,12 @@ class Rules:
         -------
         dict
             Settings one by one, the digest of the code and that of the software, and what Snakemake
-            does not compare: the command, and words that name the scene, if it is not the default.
+            does not compare: what the path of the output says already, the command, and words that
+            name the scene, if it is not the default.
         """
         module = f"keystab.stages.{stage}"
         places = options(*blocks)
-        parameters = {
+        values = {
             option: self._parameter(
                 places.get(option, option), of_set, given.get(option, _IN_PLACE)
             )
@@ -228,9 +229,13 @@ class Rules:
         }
 
         def command(wildcards: Any, input: Any, output: Any) -> str:
-            words = {option: value(wildcards).words for option, value in parameters.items()}
+            words = {option: value_of(wildcards).words for option, value_of in values.items()}
             return command_line(module, [*input.items(), *words.items(), *output.items()])
 
+        parameters: dict[str, Callable[..., Any]] = dict(values)
+        for option, value in given.items():
+            if isinstance(value, str) and "{" in value:  # the path of the output says it already
+                parameters[option] = _derived(values[option])
         return {**parameters, **self.made_with(module), "command": command, "scene": self._scene}
 
     def figure(self, name: str, draft: bool) -> dict[str, Callable[..., Any]]:
@@ -279,6 +284,11 @@ class Rules:
 
 
 _IN_PLACE = object()
+
+
+def _derived(value_of: OfJob) -> Callable[[Any, Any], Any]:
+    """Parameter that Snakemake takes for made from input, and does not compare."""
+    return lambda wildcards, input: value_of(wildcards)
 
 
 def _filled(argument: Any, names: Mapping[str, str]) -> Any:

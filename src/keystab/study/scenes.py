@@ -114,7 +114,7 @@ def resolved(settings: Settings) -> dict[str, Any]:
         full[name] = {
             **own,
             **per_view(views),
-            "assumed_blur": assumed_blur(views),
+            "assumed_blur": assumed_blur(views) if views["n_spo"] else None,
             "sigma_min": _first(views["sigma_min"], settings["detector"]["sigma_min"]),
             "dtype": _first(views["dtype"], settings["views_dtype"]),
         }
