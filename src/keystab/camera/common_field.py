@@ -155,7 +155,7 @@ def searched_windows(
     --------
     >>> specs = [ViewSpec(1.1, 10.0, (40, 40), (0.0, shift)) for shift in (0.0, 2.0)]
     >>> searched_windows(specs, (400, 400), 9)
-    [(4.0, 36.0, 4.0, 36.0), (4.0, 36.0, 4.0, 36.0)]
+    [(4.0, 36.0, 4.0, 36.0), (4.0, 36.0, 4.0, 32.0)]
     """
     if guard == 0:
         return [None] * len(specs)

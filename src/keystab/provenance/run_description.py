@@ -74,7 +74,9 @@ class About:
 
 
 def read_about(folder: Path) -> About:
-    """Read what a run says about itself.
+    """Read what a run says about itself, in a folder that was checked or is the project's own.
+
+    The committed reference may be of an earlier version: it is compared with until it is renewed.
 
     Raises
     ------
@@ -85,13 +87,20 @@ def read_about(folder: Path) -> About:
     if not path.is_file() or path.stat().st_size > MOST_BYTES_OF_ABOUT:
         raise InputError(f"{path}: no such file; make reference or make archive writes it")
     try:
-        return about_of(path.read_bytes())
+        return about_of(path.read_bytes(), any_version=True)
     except InputError as error:
         raise InputError(f"{path} {error}") from None
 
 
-def about_of(data: bytes) -> About:
+def about_of(data: bytes, any_version: bool = False) -> About:
     """Check what a run says about itself.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    any_version : bool, optional
+        Whether another version may have written it.
 
     Raises
     ------
@@ -112,7 +121,9 @@ def about_of(data: bytes) -> About:
     said = said if isinstance(said, dict) else {}
     if not _is_text(version := said.get("keystab")) or not _VERSION.fullmatch(version):
         raise InputError("says nothing about a run; make archive writes it")
-    if version != __version__:
+    if any_version:
+        said = {"zlib": "not said", **said}  # 0.1.0 did not
+    elif version != __version__:
         raise InputError(
             f"was written by keystab {version}, and this is {__version__}: check it with that "
             "version"
