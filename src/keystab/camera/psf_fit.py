@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from keystab.errors import InputError
 from keystab.utils import validation
+from keystab.utils.masks import unmasked
 
 __all__ = ["PsfFit", "border_level", "fit_psf"]
 
@@ -160,7 +161,7 @@ def border_level(psf: ArrayLike) -> float:
 
 
 def _picture(psf: ArrayLike) -> NDArray[np.float64]:
-    light = np.asarray(validation.unmasked("the picture", psf), dtype=np.float64)
+    light = np.asarray(unmasked("the picture", psf), dtype=np.float64)
     if light.ndim != 2 or min(light.shape) < 3:
         raise InputError(
             f"the picture has the shape {light.shape}; give one of at least 3 x 3 samples"

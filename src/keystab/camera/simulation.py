@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from keystab.camera.views import ViewSpec, to_reference
 from keystab.errors import InputError
 from keystab.scalespace import cosine_series
-from keystab.utils import memory, validation
+from keystab.utils import memory
+from keystab.utils.masks import unmasked
 from keystab.utils.random import random_generator
 
 __all__ = ["Scene", "simulate", "simulate_view"]
@@ -178,7 +179,7 @@ def _grey_values(reference: ArrayLike) -> NDArray[Any]:
         raise InputError(
             f"the reference is {reference!r}; give the array that read_picture returns"
         )
-    validation.unmasked("the reference", reference)
+    unmasked("the reference", reference)
     try:
         values = np.asarray(reference)
     except ValueError:  # rows of different lengths

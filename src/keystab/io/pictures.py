@@ -18,7 +18,7 @@ from keystab.errors import InputError
 from keystab.io import netpbm_pictures, pillow_pictures, tiff_pictures
 from keystab.io.picture_samples import Samples, check_channels, check_room
 from keystab.utils.files import check_writable, written_whole
-from keystab.utils.validation import unmasked
+from keystab.utils.masks import unmasked
 
 __all__ = [
     "FORMATS",

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keystab.errors import InputError
-from keystab.utils import validation
+from keystab.utils.masks import unmasked
 
 __all__ = ["basis", "coefficients", "evaluate", "evaluate_at", "gaussian", "significant"]
 
@@ -57,7 +57,7 @@ def coefficients(u: ArrayLike) -> NDArray[np.float64]:
     """
     from scipy import fft
 
-    image = np.asarray(validation.unmasked("the image", u), dtype=np.float64)
+    image = np.asarray(unmasked("the image", u), dtype=np.float64)
     if image.ndim != 2 or image.size == 0:
         raise InputError(f"an image of shape {image.shape} was given; expected (height, width)")
     a = fft.dctn(image, type=2)

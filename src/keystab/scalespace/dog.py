@@ -20,7 +20,8 @@ from keystab.errors import InputError
 from keystab.scalespace.axis import AxisOperator, Block
 from keystab.scalespace.interpolants import Interpolant, interpolant
 from keystab.scalespace.sampling import Sampling, balanced_delta
-from keystab.utils import memory, validation
+from keystab.utils import memory
+from keystab.utils.masks import unmasked
 
 # A tile of the store; searching for extrema uses flatter blocks (see `keystab.detection.extrema`).
 TILE = 128
@@ -346,7 +347,7 @@ def _axis(
 
 def checked_image(image: np.ndarray) -> np.ndarray:
     """A finite two-dimensional float64 array, or an `InputError` that says what is wrong."""
-    array = np.asarray(validation.unmasked("the image", image))
+    array = np.asarray(unmasked("the image", image))
     if array.dtype == bool or not (
         np.issubdtype(array.dtype, np.integer) or np.issubdtype(array.dtype, np.floating)
     ):
