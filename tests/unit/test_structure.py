@@ -28,7 +28,7 @@ def imported(path: Path) -> set[str]:
     return names
 
 
-LAST = ("records", "workflow", "provenance", "differences", "crate", "archive")
+LAST = ("records", "workflow", "provenance", "foreign_tables", "differences", "crate", "archive")
 LAST += ("run_description", "unpacking", "bare_code", "archived_settings", "archive_contents")
 LAST += ("result_checks", "verification", "recomputation")
 IMPORTS = {name: imported(path) for name, path in FILES.items()}
