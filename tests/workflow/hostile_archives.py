@@ -282,7 +282,12 @@ def code() -> Iterator[Hostile]:
         "workflow/jobs.py": PYTHON,
         "profiles/default/config.yaml": b"snakefile: evil.smk\n",
     }.items():
-        yield Hostile(f"{name} is code", appended(name, data), f"{name}: {other}", quick=True)
+        yield Hostile(
+            f"{name} is code",
+            appended(name, data),
+            f"{name}: {other}",
+            name == "workflow/rules/common.smk",
+        )
     coding = b"# coding: utf-7\n# +AAo-" + PYTHON.replace(b"'", b"+ACc-")
     yield Hostile(
         "a comment that is code in another encoding",
