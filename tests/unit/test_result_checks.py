@@ -6,10 +6,10 @@ import pandas as pd
 import pytest
 
 from keystab.errors import InputError
+from keystab.provenance.foreign_tables import read_foreign_table
 from keystab.provenance.result_checks import (
     _but_for_rounding,
     _check_joins,
-    _read_plain,
     left_out_rows,
     listed_in,
     verdicts_in,
@@ -112,4 +112,4 @@ def test_odd_tables_are_refused(text, said, tmp_path):
     path = tmp_path / "t.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=said):
-        _read_plain(path)
+        read_foreign_table(path)

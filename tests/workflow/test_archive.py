@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 import re
@@ -11,10 +12,13 @@ from pathlib import Path
 
 import pytest
 import small_study
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 from project import QUICK
 
 from keystab.cli import main as cli
 from keystab.errors import InputError
+from keystab.io.figure_metadata import PNG_KEY
 from keystab.provenance import archive, lineage, recomputation, result_checks, verification
 from keystab.provenance.run_description import ABOUT, LEFT_OUT, SUMS
 from keystab.provenance.study_folder import Study
@@ -261,6 +265,55 @@ def test_results_that_are_here_are_checked_down_to_the_chunk(here, monkeypatch, 
     assert again in capsys.readouterr().out
 
 
+def test_an_unpacked_archive_is_a_finished_copy(packed, tmp_path, monkeypatch, capsys):
+    with zipfile.ZipFile(packed) as file:
+        file.extractall(tmp_path / "there")
+    monkeypatch.chdir(tmp_path / "there")
+    assert cli.main(["verify"]) == 0
+    said = capsys.readouterr().out
+    assert "ok      results: 10 figures, tables and verdicts are there" in said
+    assert "ok      inputs: 13 as they were" in said and "missing" not in said
+
+
+def test_what_is_missing_is_said_first_and_once_and_then_what_would_run(here, monkeypatch, capsys):
+    monkeypatch.chdir(here.project)
+    for name in ("figures/fig1.pdf", "results/claims.json", "results/final.sha256"):
+        (here.project / name).unlink()
+    (here.project / "config/config.yaml").write_text("blur: 0.9\nseed: 1\n")
+    assert cli.main(["verify"]) == 1
+    said = capsys.readouterr().out
+    first, second = said.index("FAILED  results\n"), said.index("FAILED  workflow\n")
+    assert said.index("results of ") < first < second
+    for name in ("figures/fig1.pdf", "results/claims.json", "results/final.sha256"):
+        assert first < said.index(f"{name}: missing; `make {name}` makes it") < second
+        assert said.count(f"{name}: missing") == 1
+    assert "Taking views: Params have changed" in said[second:]
+    assert said.count("missing, as said above") == 3  # among inputs, in the list and the ledger
+
+    shutil.rmtree(here.project / "results")
+    shutil.rmtree(here.project / ".snakemake")
+    monkeypatch.setattr(verification, "_MOST_NAMED", 3)
+    assert cli.main(["verify"]) == 1
+    said = capsys.readouterr().out
+    assert "and 4 more\nFAILED  workflow\n          13 of 13 files would be made" in said
+    assert "jobs like it: Missing output files" in said
+
+
+def test_archives_of_other_versions_say_so_in_one_line(
+    packed, clone, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(clone)
+    for version in ("0.1.0", "99.0"):
+        with zipfile.ZipFile(packed) as file:
+            about = json.loads(file.read(ABOUT)) | {"keystab": version}
+        changes: dict[str, bytes | None] = {ABOUT: json.dumps(about).encode()}
+        path = rewritten(packed, tmp_path / "a.zip", changes, True)
+        assert cli.main(["verify", str(path)]) == 2
+        out, err = capsys.readouterr()
+        assert out == "" and err.count("\n") == 1
+        assert f"archive.json was written by keystab {version}, and this is" in err
+
+
 def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp_path):
     with unpacked(packed) as held:
         source = held.folder
@@ -344,6 +397,15 @@ def test_whence_follows_a_figure_to_the_scene_and_says_what_changed(here, monkey
     assert cli.main(["whence", "../figures/fig1.pdf"]) == 0
     said = capsys.readouterr().out
     assert f"fig1.csv  {digest}  " in said and "know no such figure" in said
+
+    passport = lineage.read_figure_metadata(here.project / "figures/fig1.pdf")
+    forged = dataclasses.replace(passport, version="1\x1b[2J\n2", settings={"\x07": "\x9b2J"})
+    text = PngInfo()
+    text.add_text(PNG_KEY, forged.to_text())
+    Image.new("L", (9, 9)).save(here.project / "figures/fig1.png", pnginfo=text)
+    assert cli.main(["whence", "../figures/fig1.png"]) == 0
+    said = capsys.readouterr().out
+    assert "drawn by keystab 1?[2J?2" in said and said.replace("\n", "").isprintable()
 
 
 def test_whence_names_the_command_with_its_settings(here):

@@ -7,6 +7,7 @@ import json
 import os
 import pickle
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,6 +20,8 @@ from hostile_archives import KINDS, PYTHON, SHELL, Hostile, Pickled, sealed, zip
 from project import ROOT
 
 from keystab.cli import main as cli
+from keystab.provenance import archive
+from keystab.provenance.study_folder import Study
 
 MOST_SECONDS, MOST_MEGABYTES = 10, 500
 
@@ -37,9 +40,10 @@ with open(sys.argv[1], "w") as file:
 class Place:
     """A folder with all that somebody who verifies an archive has: nothing in it may change."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, reference: Path) -> None:
         self.folder, self.clone = folder, folder / "clone"
         small_study.write(self.clone)
+        shutil.copytree(reference, self.clone / "results/reference")
         for name in ("home", "tmp", "outside"):
             (folder / name).mkdir()
         for name in ("victim.txt", "scene.txt"):
@@ -70,9 +74,15 @@ def members(packed: Path) -> dict[str, bytes]:
         return {name: file.read(name) for name in file.namelist()}
 
 
+@pytest.fixture(scope="session")
+def reference(ran: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The committed reference of the small study."""
+    return archive.publish(ran, tmp_path_factory.mktemp("published") / "reference")
+
+
 @pytest.fixture
-def place(tmp_path: Path) -> Place:
-    return Place(tmp_path / "place")
+def place(tmp_path: Path, reference: Path) -> Place:
+    return Place(tmp_path / "place", reference)
 
 
 def check(kind: Hostile, status: int, said: str, errors: str) -> None:

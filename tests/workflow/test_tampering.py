@@ -48,10 +48,28 @@ def clone(ran: Study, tmp_path: Path) -> Path:
     return folder
 
 
-def kinds(tamperings: list[Tampering]) -> list[object]:
+QUICK_IN_TREES = (
+    "verdicts flipped: results/claims.csv",
+    "a red square: figures/fig1.png",
+    "record dropped: results/final.sha256",
+)
+QUICK_IN_ARCHIVES = (
+    "a byte changed: figures/fig1.pdf",
+    "cut in half: results/tables/figS3.csv",
+    "left-out.csv: digest of results/views/still",
+    "other settings named",
+    "forged: verdicts flipped",
+    "forged: pixels exchanged",
+)
+
+
+def kinds(tamperings: list[Tampering], quick: tuple[str, ...]) -> list[object]:
     """Parameters of a test: all but a few are slow."""
+    assert set(quick) <= {it.name for it in tamperings}
     marks = pytest.mark.slow
-    return [pytest.param(it, id=it.name, marks=() if it.quick else marks) for it in tamperings]
+    return [
+        pytest.param(it, id=it.name, marks=() if it.name in quick else marks) for it in tamperings
+    ]
 
 
 def failed(said: str) -> list[str]:
@@ -97,7 +115,7 @@ def test_what_nobody_changed_is_verified_though_all_was_rewritten(
     assert "ok      pictures: 4 of 4 as in results/reference" in said
 
 
-@pytest.mark.parametrize("it", kinds(IN_TREES))
+@pytest.mark.parametrize("it", kinds(IN_TREES, QUICK_IN_TREES))
 def test_in_a_finished_tree_it_is_named(it, ran, tmp_path, monkeypatch, capsys):
     folder = tmp_path / "here"
     shutil.copytree(ran.project, folder)
@@ -115,7 +133,7 @@ def test_in_a_finished_tree_it_is_named(it, ran, tmp_path, monkeypatch, capsys):
     check(it, status, *capsys.readouterr())
 
 
-@pytest.mark.parametrize("it", kinds([*IN_ARCHIVES, *FORGERIES]))
+@pytest.mark.parametrize("it", kinds([*IN_ARCHIVES, *FORGERIES], QUICK_IN_ARCHIVES))
 def test_in_an_archive_with_rewritten_sums_it_is_named(
     it, members, clone, tmp_path, monkeypatch, capsys
 ):

@@ -22,8 +22,8 @@ _MOST_PIXELS = 100_000_000
 _ESCAPE = re.compile(rb"\\([0-7]{1,3}|.)", re.DOTALL)
 _KEYWORDS_START = b"/Keywords ("
 _KEYWORDS = re.compile(rb"/Keywords \(((?:[^()\\]|\\.)*)\)", re.DOTALL)
-_MOST_BYTES = 100_000
-"""Of a passport in a PDF, which lists the tables of one figure."""
+_MOST_BYTES, _MOST_CHUNKS = 100_000, 100
+"""Of a passport, which lists the tables of one figure, and of a PNG before it."""
 
 
 def read_figure_metadata(path: Path | str, as_drawn: bool = False) -> FigureMetadata:
@@ -89,17 +89,37 @@ def _unescaped(found: re.Match[bytes]) -> bytes:
 
 
 def _text_of_png(path: Path, as_drawn: bool) -> str | None:
+    if as_drawn:
+        return _text_before_pixels(path)
     from PIL import Image
 
     try:
         # Opening reads what stands before the pixels; what stands behind needs these decoded.
         with warnings.catch_warnings(action="ignore"), Image.open(path, formats=["PNG"]) as picture:
-            if not as_drawn and picture.width * picture.height <= _MOST_PIXELS:
+            if picture.width * picture.height <= _MOST_PIXELS:
                 picture.load()
             found = picture.info.get(PNG_KEY)
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
         raise InputError(f"{path}: a damaged PNG; draw it again") from None
     return found if found is None else str(found)
+
+
+def _text_before_pixels(path: Path) -> str | None:
+    """Plain text of a PNG under the key of passports, if it is among the first chunks."""
+    with path.open("rb") as file:
+        file.seek(8)
+        for _ in range(_MOST_CHUNKS):
+            head = file.read(8)
+            length, kind = int.from_bytes(head[:4], "big"), head[4:]
+            if len(head) < 8 or kind in (b"IDAT", b"IEND"):
+                break
+            if kind == b"tEXt" and length <= _MOST_BYTES:
+                key, _, text = file.read(length).partition(b"\0")
+                if key == PNG_KEY.encode():
+                    return text.decode("latin-1")
+                length = 0
+            file.seek(length + 4, 1)
+    return None
 
 
 def file_digest(path: Path) -> str:

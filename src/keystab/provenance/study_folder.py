@@ -174,7 +174,8 @@ class Study:
                 cwd=self.project,
                 env=_environment(self.home),
                 capture_output=True,
-                text=True,
+                encoding="utf-8",
+                errors="replace",
                 timeout=self.most_seconds,
             )
         except subprocess.TimeoutExpired:

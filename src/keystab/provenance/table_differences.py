@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from keystab.io.tables import read_table
+from keystab.provenance.foreign_tables import read_foreign_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,9 +93,10 @@ def file_difference(
     Raises
     ------
     InputError
-        If one of them cannot be read.
+        If one of them cannot be read, see `keystab.foreign_tables.read_foreign_table`.
     """
-    return difference(read_table(expected), read_table(found), rtol, atol)
+    before, after = (read_foreign_table(Path(path)) for path in (expected, found))
+    return difference(before, after, rtol, atol)
 
 
 def _column(
