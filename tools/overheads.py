@@ -16,6 +16,7 @@ import pstats
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 LOGS = ROOT / "logs"
@@ -47,15 +48,15 @@ def print_reading_and_writing(profiles: list[Path]) -> None:
     within = total = 0.0
     by_job: dict[str, float] = {}
     for path in profiles:
-        profile = pstats.Stats(str(path))
+        profile: Any = pstats.Stats(str(path))  # its stub lacks the table of calls
         seconds = sum(outermost(call, callers) for call, (*_, callers) in profile.stats.items())
         within += seconds
         total += profile.total_tt
         job = path.name.split(".")[0]
         by_job[job] = by_job.get(job, 0.0) + seconds
     print(f"{len(profiles)} jobs, {total:.0f} s in all, {within / total:.1%} reading and writing")
-    for job, seconds in sorted(by_job.items(), key=lambda item: -item[1])[:5]:
-        print(f"  {job}: {seconds:.1f} s")
+    for job, spent in sorted(by_job.items(), key=lambda item: -item[1])[:5]:
+        print(f"  {job}: {spent:.1f} s")
 
 
 def outermost(call: Call, callers: dict[Call, tuple[int, int, float, float]]) -> float:
@@ -106,8 +107,8 @@ def print_imports() -> None:
         total += seconds
         shares.append((sum(own) / seconds, str(name)))
     print(f"{len(shares)} jobs, {total:.0f} s in all, {start / total:.1%} of it imports")
-    for share, name in sorted(shares, reverse=True)[:5]:
-        print(f"  {name}: {share:.0%}")
+    for share, job in sorted(shares, reverse=True)[:5]:
+        print(f"  {job}: {share:.0%}")
 
 
 if __name__ == "__main__":

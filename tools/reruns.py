@@ -186,9 +186,11 @@ def overlay(place: str, value: Any) -> dict[str, Any]:
     >>> overlay("detector.kappa", 1.5)
     {'detector': {'kappa': 1.5}}
     """
-    for key in reversed(place.split(".")):
-        value = {key: value}
-    return value
+    *above, last = place.split(".")
+    block = {last: value}
+    for key in reversed(above):
+        block = {key: block}
+    return block
 
 
 def change(place: str, schema: Mapping[str, Any]) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def in_short(reason: str) -> str:
     """
     if FOLLOWS in reason:
         return FOLLOWS
-    parts = []
+    parts: list[str] = []
     head, _, files = reason.partition(": ")
     if found := PARAMS.search(reason):
         parts += changes(found["before"].strip(), found["now"].strip())

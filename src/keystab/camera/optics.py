@@ -247,7 +247,8 @@ def diffraction_mtf(frequency: ArrayLike) -> Array:
     [1.0, 0.391, 0.0, 0.0]
     """
     f = np.minimum(np.asarray(frequency, dtype=np.float64), 1.0)
-    return 2 / np.pi * (np.arccos(f) - f * np.sqrt(1 - f**2))
+    mtf: NDArray[np.float64] = 2 / np.pi * (np.arccos(f) - f * np.sqrt(1 - f**2))
+    return mtf
 
 
 def lens_transfer(frequency: ArrayLike, w20: float = 0.0, w40: float = 0.0) -> Array:

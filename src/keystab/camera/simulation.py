@@ -221,7 +221,8 @@ def _interpolate(
     columns = cosine_series.basis(left + spacing * np.arange(n_columns), coefs.shape[1], counts[1])
     grid = rows @ weighted @ columns.T
     where = np.stack([(y - top) / spacing, (x - left) / spacing])
-    return ndimage.map_coordinates(grid, where, order=5, prefilter=False)
+    values: NDArray[np.float64] = ndimage.map_coordinates(grid, where, order=5, prefilter=False)
+    return values
 
 
 def _check_memory(scene: Scene, spec: ViewSpec) -> None:

@@ -94,7 +94,7 @@ def stationary_point(gradient: np.ndarray, hessian: np.ndarray) -> np.ndarray:
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-1)
     determinant = np.einsum("ni,ni->n", a, cofactors[:, :, 0])
     with np.errstate(divide="ignore", invalid="ignore"):
-        offset = -np.einsum("nij,nj->ni", cofactors, gradient) / determinant[:, None]
+        offset: np.ndarray = -np.einsum("nij,nj->ni", cofactors, gradient) / determinant[:, None]
     offset[~np.isfinite(offset).all(axis=1)] = np.nan
     return offset
 
@@ -239,7 +239,8 @@ def _step(alpha: np.ndarray, max_offset: float, move: str) -> np.ndarray:
         step = np.rint(np.clip(np.nan_to_num(alpha, nan=0.0), -(2.0**40), 2.0**40))
     else:
         step = np.sign(alpha) * (np.abs(alpha) > max_offset)
-    return np.nan_to_num(step).astype(np.int64)
+    moved: np.ndarray = np.nan_to_num(step).astype(np.int64)
+    return moved
 
 
 def _check(move: str, max_offset: float, max_models: int) -> None:

@@ -126,4 +126,5 @@ def quantised(image: NDArray[np.float64], bits: int | None) -> NDArray[np.float6
     if bits is None:
         return image
     most = 2**bits - 1
-    return np.round(np.clip(image, 0.0, 1.0) * most) / most
+    rounded: NDArray[np.float64] = np.round(np.clip(image, 0.0, 1.0) * most) / most
+    return rounded

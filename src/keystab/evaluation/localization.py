@@ -153,4 +153,6 @@ def _variances(values: NDArray[np.float64], sets: NDArray[np.int64]) -> NDArray[
     deviation = np.where(present, values - centre[:, None], 0.0)
     m = (present @ sets.T).astype(float)
     m[m < 2] = np.nan
-    return np.maximum((deviation**2 @ sets.T - (deviation @ sets.T) ** 2 / m) / (m - 1), 0.0)
+    variance = (deviation**2 @ sets.T - (deviation @ sets.T) ** 2 / m) / (m - 1)
+    bounded: NDArray[np.float64] = np.maximum(variance, 0.0)
+    return bounded

@@ -241,4 +241,6 @@ def causes(
 def with_positions(detections: pd.DataFrame) -> pd.DataFrame:
     """Detections that are somewhere: models without a stationary point are nowhere."""
     place = detections[["y", "x", "sigma"]].to_numpy(dtype=float)
-    return detections[np.isfinite(place).all(axis=1) & (place[:, 2] > 0)].reset_index(drop=True)
+    is_somewhere = np.isfinite(place).all(axis=1) & (place[:, 2] > 0)
+    kept: pd.DataFrame = detections[is_somewhere].reset_index(drop=True)
+    return kept

@@ -302,4 +302,7 @@ def weighted_areas(
     beaten = beaten + running[:, np.searchsorted(bad, good, "right")]
     total = good_counts.sum(axis=1) * bad_counts.sum(axis=1)
     won = (good_counts * beaten).sum(axis=1)
-    return np.divide(won, 2 * total, out=np.full(len(total), np.nan), where=total > 0)
+    areas: NDArray[np.float64] = np.divide(
+        won, 2 * total, out=np.full(len(total), np.nan), where=total > 0
+    )
+    return areas

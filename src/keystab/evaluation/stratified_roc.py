@@ -160,7 +160,9 @@ def _rejected(
     places = np.where(enough.any(axis=1), np.searchsorted(bad, good, "left")[limit], len(bad))
     removed = below[np.arange(len(below)), places]
     exists = (total[:, 0] > 0) & (below[:, -1] > 0)
-    return np.divide(removed, below[:, -1], out=np.full(len(below), np.nan), where=exists)
+    shares: NDArray[np.float64] = np.full(len(below), np.nan)
+    np.divide(removed, below[:, -1], out=shares, where=exists)
+    return shares
 
 
 def _mean_over_strata(
@@ -171,4 +173,6 @@ def _mean_over_strata(
     weights = np.where(np.isnan(values), 0.0, weights)
     total = weights.sum(axis=0)
     summed = (np.nan_to_num(values) * weights).sum(axis=0)
-    return np.divide(summed, total, out=np.full(total.shape, np.nan), where=total > 0)
+    means: NDArray[np.float64] = np.full(total.shape, np.nan)
+    np.divide(summed, total, out=means, where=total > 0)
+    return means

@@ -288,7 +288,7 @@ def laplacian_scale(
             cosine_series.evaluate(coefs, [at[0]], [at[1]], blur, orders)[0, 0]
             for orders in ((2, 0), (0, 2))
         ]
-        return -abs(scale2 * sum(second))
+        return -abs(scale2 * float(sum(second)))
 
     found = minimize_scalar(value, bounds=(low, high), method="bounded", options={"xatol": 1e-9})
     inside = min(found.x - low, high - found.x) > 1e-6

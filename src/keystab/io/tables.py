@@ -122,12 +122,14 @@ def _read_csv(path: Path) -> pd.DataFrame:
     # From pandas 3.1 every float is read back exactly; before, only on request.
     older = tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1)
     exact: dict[str, Any] = {"float_precision": "round_trip"} if older else {}
-    return pd.read_csv(
+    table: pd.DataFrame = pd.read_csv(
         path, keep_default_na=False, na_values=[""], low_memory=False, encoding="utf-8", **exact
     )
+    return table
 
 
 def _read_parquet(path: Path) -> pd.DataFrame:
     from pyarrow import parquet
 
-    return parquet.read_table(path).to_pandas()
+    table: pd.DataFrame = parquet.read_table(path).to_pandas()
+    return table

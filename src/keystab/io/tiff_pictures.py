@@ -108,7 +108,7 @@ def _orientation(page: Any) -> int:
     """Orientation that the tags ask for; 1 where there is none."""
     tag = page.tags.get(_ORIENTATION)
     if tag is not None:
-        return tag.value
+        return int(tag.value)
     xmp = page.tags.get(_XMP)
     text = xmp.value if xmp is not None and isinstance(xmp.value, bytes) else b""
     found = re.search(rb'tiff:Orientation(?:="|>)([0-9])', text)
@@ -189,8 +189,8 @@ def _is_whole(page: Any) -> bool:
     n_segments = math.prod(page.chunked)
     counts = page.databytecounts[:n_segments]
     row_bytes = -(-page.imagewidth * page.samplesperpixel * page.bitspersample // 8)
-    is_enough = page.compression != 1 or sum(counts) >= page.imagelength * row_bytes
-    return len(counts) == n_segments and min(counts) > 0 and is_enough
+    is_enough: bool = page.compression != 1 or sum(counts) >= page.imagelength * row_bytes
+    return len(counts) == n_segments and bool(min(counts) > 0) and is_enough
 
 
 def _codec(page: Any) -> str:

@@ -160,7 +160,8 @@ def open_dataset(path: str | os.PathLike[str], kind: Kind) -> xr.Dataset:
     import xarray as xr
 
     _, folder = open_group(path, kind)
-    return xr.open_zarr(folder, chunks=None, consolidated=False, zarr_format=3)
+    dataset: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=False, zarr_format=3)
+    return dataset
 
 
 __all__ = ["attributes_of"]

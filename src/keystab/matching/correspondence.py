@@ -146,7 +146,8 @@ def pairs_within(
             f"{len(points)} detections have {n_pairs} pairs that are the same, allowed are "
             f"{_MOST_PAIRS}: lower space_tolerance or scale_ratio, or compare fewer detections"
         )
-    return tree.query_pairs(1 + _ROUNDING, p=np.inf, output_type="ndarray")
+    pairs: NDArray[np.intp] = tree.query_pairs(1 + _ROUNDING, p=np.inf, output_type="ndarray")
+    return pairs
 
 
 def pairs_between(

@@ -15,8 +15,12 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # Candidate number (lower is preferred) -> bit mask of the elements it covers; ascending numbers.
 Candidates = dict[int, int]
@@ -324,7 +328,7 @@ def _relaxation(candidates: Candidates) -> int:
     return math.ceil(result.fun - 1e-6) if result.status == 0 else 1
 
 
-def _incidence(candidates: Candidates):  # type: ignore[no-untyped-def]
+def _incidence(candidates: Candidates) -> csr_array:
     """Sparse 0/1 matrix, one row per element and one column per candidate."""
     from scipy.sparse import csr_array
 

@@ -255,7 +255,7 @@ def set_codes(
         return np.zeros(len(detections), dtype=np.intp)
     if set_column not in detections:
         set_names(detections, set_column)  # says what is missing
-    codes = pd.Index(names).get_indexer(pd.Index(detections[set_column]))
+    codes: NDArray[np.intp] = pd.Index(names).get_indexer(pd.Index(detections[set_column]))
     if (codes < 0).any():
         unknown = detections[set_column].iloc[int(np.argmin(codes))]
         raise InputError(
@@ -278,4 +278,5 @@ def _count_sets(pairs: NDArray[np.intp], codes: NDArray[np.intp]) -> NDArray[np.
     present[np.arange(len(codes)), codes] = True
     present[pairs[:, 0], codes[pairs[:, 1]]] = True
     present[pairs[:, 1], codes[pairs[:, 0]]] = True
-    return present.sum(axis=1)
+    counts: NDArray[np.intp] = present.sum(axis=1)
+    return counts

@@ -194,7 +194,8 @@ def normalised(
     space = np.asarray(delta_min, dtype=float) / np.asarray(sigma, dtype=float)
     scale = log_scale_unit * math.log(2) / np.asarray(n_spo, dtype=float)
     step = np.stack(np.broadcast_arrays(scale, space, space), axis=-1)
-    return hessian / (step[..., :, None] * step[..., None, :])
+    rescaled: NDArray[np.float64] = hessian / (step[..., :, None] * step[..., None, :])
+    return rescaled
 
 
 def condition_numbers(hessian: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -261,7 +261,8 @@ def _distance(origin: NDArray[np.float64], points: NDArray[np.float64]) -> NDArr
     """Distance in units of the first of two places."""
     scale = np.log(points[:, 0] / origin[:, 0])
     space = (points[:, 1:] - origin[:, 1:]) / origin[:, :1]
-    return np.sqrt(scale**2 + (space**2).sum(axis=1))
+    distance: NDArray[np.float64] = np.sqrt(scale**2 + (space**2).sum(axis=1))
+    return distance
 
 
 def _newton(jets: Jets) -> NDArray[np.float64]:
@@ -269,7 +270,8 @@ def _newton(jets: Jets) -> NDArray[np.float64]:
     values, axes = np.linalg.eigh(jets.hessian)
     slope = np.einsum("nij,ni->nj", axes, jets.gradient)
     step = np.divide(-slope, values, out=np.zeros_like(slope), where=np.abs(values) > 1e-14)
-    return np.einsum("nij,nj->ni", axes, step)
+    moved: NDArray[np.float64] = np.einsum("nij,nj->ni", axes, step)
+    return moved
 
 
 def _fold_starts(

@@ -140,7 +140,10 @@ def _edge(hessian: NDArray[np.float64]) -> NDArray[np.float64]:
     values = np.linalg.eigvalsh(hessian)
     order = np.argsort(np.abs(values), axis=1)
     small, large = np.take_along_axis(values, order, axis=1).T
-    return np.divide(small, large, out=np.zeros(len(values)), where=large != 0)
+    ratio: NDArray[np.float64] = np.divide(
+        small, large, out=np.zeros(len(values)), where=large != 0
+    )
+    return ratio
 
 
 def model_inputs(table: pd.DataFrame, groups: pd.DataFrame) -> pd.DataFrame:

@@ -60,7 +60,7 @@ def coefficients(u: ArrayLike) -> NDArray[np.float64]:
     image = np.asarray(unmasked("the image", u), dtype=np.float64)
     if image.ndim != 2 or image.size == 0:
         raise InputError(f"an image of shape {image.shape} was given; expected (height, width)")
-    a = fft.dctn(image, type=2)
+    a: NDArray[np.float64] = fft.dctn(image, type=2)
     if not np.isfinite(a[0, 0]):  # the sum of all pixels: one bad pixel is enough
         raise InputError("the image holds NaN or infinite values; replace them by finite ones")
     # scipy's transform is 2 sum_n u_n cos(...) per axis; its inverse weighs frequency 0 by 1/2.
@@ -90,7 +90,8 @@ def gaussian(n: int, blur: float) -> NDArray[np.float64]:
     >>> gaussian(3, 0.0)
     array([1., 1., 1.])
     """
-    return np.exp(-0.5 * (np.pi * blur / n * np.arange(n)) ** 2)
+    response: NDArray[np.float64] = np.exp(-0.5 * (np.pi * blur / n * np.arange(n)) ** 2)
+    return response
 
 
 def significant(n: int, blur: float) -> int:

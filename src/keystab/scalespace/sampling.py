@@ -145,7 +145,7 @@ class Sampling:
     @property
     def stride(self) -> int:
         """Samples of the first octave's grid from one sample of this octave to the next."""
-        return 2**self.octave
+        return 1 << self.octave
 
     @property
     def step(self) -> float:

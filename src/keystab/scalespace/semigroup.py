@@ -83,7 +83,8 @@ def sampled_kernel(sigma: float, truncation: float = 4.0) -> Profile:
     (0.00067, 0.0625)
     """
     samples = blob_profile(2 * ceil(truncation * sigma) + 1, sigma)
-    return samples / samples.sum()
+    normed: NDArray[np.float64] = samples / samples.sum()
+    return normed
 
 
 def discrete_analogue_kernel(sigma: float, radius: int) -> Profile:

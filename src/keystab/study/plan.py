@@ -202,7 +202,8 @@ def starts_within(settings: Settings, figure: str) -> list[float]:
 
 def largest_blur(settings: Settings, figure: str) -> float:
     """Camera blur of the views that a figure studies, of those that share one."""
-    return max(settings["sets"][sets_of_figure(settings, figure)[0]]["blur"])
+    blur: float = max(settings["sets"][sets_of_figure(settings, figure)[0]]["blur"])
+    return blur
 
 
 # ---------------------------------------------------------------------------------------------
@@ -303,7 +304,8 @@ def of_single_precision(settings: Settings, name: str, key: str) -> float:
 def end_of_truth(settings: Settings) -> float:
     """Scale up to which true extrema are sought."""
     truth = settings["truth"]
-    return settings["detector"]["sigma_min"] * truth["last_scale"] * truth["beyond"]
+    end: float = settings["detector"]["sigma_min"] * truth["last_scale"] * truth["beyond"]
+    return end
 
 
 class Ratio(NamedTuple):

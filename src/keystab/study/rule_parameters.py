@@ -188,7 +188,7 @@ class Rules:
 
     def growing(self, function: Callable[..., int], *arguments: Any) -> Callable[[Any, int], int]:
         """A resource that grows with every attempt."""
-        amount_of = self.of(function, *arguments)
+        amount_of: Callable[[Any], int] = self.of(function, *arguments)
 
         def amount(wildcards: Any, attempt: int) -> int:
             return attempt * amount_of(wildcards)

@@ -81,7 +81,8 @@ def checked(given: Settings, schema: Schema) -> Settings:
     """
     kept = without_null_entries(given, schema)
     refuse(schema_problems(kept, schema))
-    return completed(kept, schema)
+    complete: dict[str, Any] = completed(kept, schema)
+    return complete
 
 
 def refuse(problems: Sequence[str]) -> None:
@@ -348,7 +349,7 @@ def _check_increasing(_validator: Any, wanted: bool, value: Any, _schema: Schema
             yield jsonschema.ValidationError("not increasing")
 
 
-_VALIDATOR = jsonschema.validators.extend(
+_VALIDATOR = jsonschema.validators.extend(  # type: ignore[no-untyped-call]  # its stub has no types
     jsonschema.Draft202012Validator,
     {"type": _check_type, "increasing": _check_increasing},
     # 15.0 is an integer to JSON schema; in the name of a file it would be another sampling.

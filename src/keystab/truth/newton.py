@@ -165,7 +165,8 @@ def newton_step(jets: Jets) -> NDArray[np.float64]:
     slope = np.einsum("nij,ni->nj", axes, jets.gradient)
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.nan_to_num(-slope / values, nan=0.0, posinf=0.0, neginf=0.0)
-    return np.einsum("nij,nj->ni", axes, step)
+    moved: NDArray[np.float64] = np.einsum("nij,nj->ni", axes, step)
+    return moved
 
 
 def _moved(
@@ -219,7 +220,8 @@ def _polish(
     every = np.arange(sign.size)
     here = model(jets, every)
     values = np.linalg.eigvalsh(-sign[:, None, None] * here.hessian)
-    arrived = (values[:, 0] > 0) & (np.linalg.norm(newton_step(here), axis=1) < 1e-4)
+    is_near = np.linalg.norm(newton_step(here), axis=1) < 1e-4
+    arrived: NDArray[np.bool_] = (values[:, 0] > 0) & is_near
     rows = every[arrived]
     # The first of them leaves at most 1e-8 of the way, the second what rounding does.
     if slices:

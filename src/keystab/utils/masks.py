@@ -19,7 +19,8 @@ def unmasked(name: str, array: Any) -> Any:
     >>> unmasked("image", [[0.5]])
     [[0.5]]
     """
-    n_masked = int(np.ma.count_masked(array)) if isinstance(array, np.ma.MaskedArray) else 0
+    is_masked = isinstance(array, np.ma.MaskedArray)
+    n_masked = int(np.ma.getmaskarray(array).sum()) if is_masked else 0
     if n_masked:
         raise InputError(
             f"{name} has {n_masked} masked value{'s' * (n_masked > 1)}, of which nothing is known: "
