@@ -91,6 +91,8 @@ def plan(overlay: Mapping[str, Any] | None = None) -> Plan:
                 workdir=Path(empty),
             )
             planned.dag(DAGSettings(forceall=True)).summary()
+            # The plan itself, and what Snakemake compares of a job, have no public names: its own
+            # functions are asked, here and in _jobs, so that the table says what Snakemake does.
             workflow = planned._workflow
             jobs = _jobs(workflow.dag, workflow.persistence, [rule.name for rule in workflow.rules])
             os.chdir(here)

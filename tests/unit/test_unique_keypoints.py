@@ -10,7 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from keystab.errors import InputError
-from keystab.matching.unique_keypoints import gather, matches, occurrence, unique_keypoints
+from keystab.matching.unique_keypoints import (
+    gather,
+    matches,
+    minimum_unique_set,
+    occurrence,
+    unique_keypoints,
+)
 
 COLUMNS = ["y", "x", "sigma", "sign", "set"]
 
@@ -54,12 +60,12 @@ DETECTION = st.tuples(
 @given(st.lists(DETECTION, min_size=1, max_size=11), st.booleans(), st.booleans())
 def test_unique_set_equals_enumeration(rows, match_sign, reverse):
     table = pd.DataFrame(rows, columns=COLUMNS)
-    unique = unique_keypoints(table, match_sign=match_sign, reverse_order=reverse)
-    found = set(unique[COLUMNS].itertuples(index=False, name=None))
+    unique = minimum_unique_set(table, match_sign=match_sign, reverse_order=reverse)
+    found = set(unique.keypoints[COLUMNS].itertuples(index=False, name=None))
     assert found == unique_by_enumeration(table, match_sign, reverse)
-    assert len(unique) == len(found)
-    assert unique.attrs["gap"] == 0
-    assert unique.attrs["canonical"]
+    assert len(unique.keypoints) == len(found)
+    assert unique.gap == 0
+    assert unique.canonical
 
 
 @settings(max_examples=60, deadline=None)
@@ -77,12 +83,12 @@ def test_unique_set_does_not_depend_on_the_order_of_rows(rows, random):
 def test_chain(n):
     """Detections 0.9 px apart form a path, whose domination number is ceil(n / 3)."""
     table = pd.DataFrame({"y": 0.9 * np.arange(n), "x": 0.0, "sigma": 1.1, "set": 0})
-    unique = unique_keypoints(table)
-    assert len(unique) == -(-n // 3)
-    assert unique.attrs["gap"] == 0
-    assert unique.attrs["n_components"] == 1
-    assert unique.attrs["largest_component"] == n
-    assert occurrence(unique, table).to_numpy().all()
+    unique = minimum_unique_set(table)
+    assert len(unique.keypoints) == -(-n // 3)
+    assert unique.gap == 0
+    assert unique.n_components == 1
+    assert unique.largest_component == n
+    assert occurrence(unique.keypoints, table).to_numpy().all()
 
 
 def test_unique_rows_keep_index_columns_and_dtypes():
@@ -93,7 +99,6 @@ def test_unique_rows_keep_index_columns_and_dtypes():
     unique = unique_keypoints(table)
     assert unique.index.tolist() == [20, 10]  # sorted by y
     pd.testing.assert_frame_equal(unique, table.loc[[20, 10]])
-    assert "gap" not in table.attrs
 
 
 def test_detections_seen_with_more_sets_are_preferred():
@@ -119,20 +124,21 @@ def test_past_the_size_limit_the_gap_is_reported():
             "set": 0,
         }
     )
-    exact, greedy = unique_keypoints(table), unique_keypoints(table, size_limit=20)
-    assert exact.attrs["gap"] == 0
-    assert not greedy.attrs["canonical"]
-    assert len(greedy) - greedy.attrs["gap"] <= len(exact) <= len(greedy)
-    assert occurrence(greedy, table).to_numpy().all()
-    assert (matches(table, greedy, set_column=None) >= 0).all()  # everything is covered
+    exact, greedy = minimum_unique_set(table), minimum_unique_set(table, size_limit=20)
+    assert exact.gap == 0
+    assert not greedy.canonical
+    n_greedy = len(greedy.keypoints)
+    assert n_greedy - greedy.gap <= len(exact.keypoints) <= n_greedy
+    assert occurrence(greedy.keypoints, table).to_numpy().all()
+    assert (matches(table, greedy.keypoints, set_column=None) >= 0).all()  # everything is covered
 
 
 def test_nothing_detected():
     table = pd.DataFrame({name: [] for name in COLUMNS}, dtype=float)
-    unique = unique_keypoints(table)
-    assert len(unique) == 0
-    assert unique.attrs["gap"] == 0
-    assert matches(unique, table, sets=[0, 1]).shape == (0, 2)
+    unique = minimum_unique_set(table)
+    assert len(unique.keypoints) == 0
+    assert unique.gap == 0
+    assert matches(unique.keypoints, table, sets=[0, 1]).shape == (0, 2)
 
 
 def test_matches_equal_search_by_hand():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
@@ -75,13 +76,13 @@ def build_parser() -> argparse.ArgumentParser:
     )
     to.add_argument("path", metavar="PATH", type=Path, help="store, .csv or .parquet table")
     to.set_defaults(run=inspect)
-    _study_commands(commands)
+    _study_commands(commands.add_parser)
     return parser
 
 
-def _study_commands(commands: argparse._SubParsersAction[_Parser]) -> None:
+def _study_commands(add_parser: Callable[..., argparse.ArgumentParser]) -> None:
     """Add the commands that are about the study; they are given in the project's folder."""
-    to = commands.add_parser(
+    to = add_parser(
         "whence",
         help="say where a figure of the study comes from",
         description="Say what drew a figure, from which tables, what these were made from, and how "
@@ -89,7 +90,7 @@ def _study_commands(commands: argparse._SubParsersAction[_Parser]) -> None:
     )
     to.add_argument("figure", metavar="FIGURE", type=Path, help="figure of the study, PDF or PNG")
     to.set_defaults(run=whence)
-    to = commands.add_parser(
+    to = add_parser(
         "archive",
         help="pack a finished run of the study into one file",
         description="Write {results}/archive/keystab-VERSION.zip: figures, tables, verdicts, code, "
@@ -97,7 +98,7 @@ def _study_commands(commands: argparse._SubParsersAction[_Parser]) -> None:
     )
     _configfile_argument(to)
     to.set_defaults(run=archive)
-    to = commands.add_parser(
+    to = add_parser(
         "reference",
         help="copy the small results of a finished run to results/reference",
         description="Copy tables, verdicts and PNG figures, with their digests and what they were "
@@ -105,7 +106,7 @@ def _study_commands(commands: argparse._SubParsersAction[_Parser]) -> None:
     )
     _configfile_argument(to)
     to.set_defaults(run=reference)
-    to = commands.add_parser(
+    to = add_parser(
         "verify",
         help="check an archive of the study, or the results that are here",
         description="Check an archive against the code, settings and lock file here, without "

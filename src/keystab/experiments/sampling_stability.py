@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from keystab.evaluation.intervals import wilson_interval
 from keystab.evaluation.stability import new_and_lost
-from keystab.matching.unique_keypoints import matches, unique_keypoints
+from keystab.matching.unique_keypoints import matches, minimum_unique_set
 from keystab.prediction.features import condition_numbers, hessians
 
 Same = Mapping[str, Any]
@@ -42,14 +42,14 @@ def sampling_counts(extrema: pd.DataFrame, common: pd.DataFrame, same: Same) -> 
         the quartiles ``median_condition``, ``q25_condition``, ``q75_condition`` of the condition
         number of the Hessian per grid step over all extrema; NaN where there are none.
     """
-    unique = unique_keypoints(common, **same, set_column=None)
+    unique = minimum_unique_set(common, **same, set_column=None)
     condition = condition_numbers(hessians(extrema))
     quartiles = np.quantile(condition, [0.5, 0.25, 0.75]) if len(condition) else [np.nan] * 3
     return {
         "n_extrema": len(extrema),
         "n_common": len(common),
-        "n_unique": len(unique),
-        "gap": unique.attrs["gap"],
+        "n_unique": len(unique.keypoints),
+        "gap": unique.gap,
         **dict(zip(("median_condition", "q25_condition", "q75_condition"), quartiles, strict=True)),
     }
 
@@ -151,13 +151,13 @@ def keypoints_of_samplings(
         Choose among minimum sets the other way round, see
         `keystab.matching.unique_keypoints.unique_keypoints`.
     """
-    unique = unique_keypoints(common, **same, set_column="n_spo", reverse_order=reverse_order)
-    found = matches(unique, common, **same, set_column="n_spo", sets=samplings)
-    keypoints = unique[["y", "x", "sigma", "sign"]].reset_index(drop=True)
-    keypoints.insert(0, "keypoint", np.arange(len(unique)))
+    unique = minimum_unique_set(common, **same, set_column="n_spo", reverse_order=reverse_order)
+    found = matches(unique.keypoints, common, **same, set_column="n_spo", sets=samplings)
+    keypoints = unique.keypoints[["y", "x", "sigma", "sign"]].reset_index(drop=True)
+    keypoints.insert(0, "keypoint", np.arange(len(keypoints)))
     keypoints["n_samplings"] = (found >= 0).sum(axis=1)
     keypoints["stability"] = keypoints["n_samplings"] / len(samplings)
-    return Matched(keypoints, found, int(unique.attrs["gap"]))
+    return Matched(keypoints, found, unique.gap)
 
 
 def long_matches(

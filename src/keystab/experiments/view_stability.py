@@ -18,7 +18,7 @@ from keystab.evaluation.intervals import Purpose, normal_half_width, wilson_inte
 from keystab.evaluation.localization import mean_localization
 from keystab.evaluation.stability import stability_curve
 from keystab.matching.common_range import CommonRange
-from keystab.matching.unique_keypoints import matches, unique_keypoints
+from keystab.matching.unique_keypoints import matches, minimum_unique_set
 
 Labels = Mapping[str, Any]
 """What a table is about: columns of one value each, put before its own."""
@@ -59,9 +59,9 @@ def keypoints_of_views(common: pd.DataFrame, n_views: int, same: Mapping[str, An
     same : mapping
         Options of `keystab.matching.correspondence.same`.
     """
-    unique = unique_keypoints(common, **same, set_column="view")
-    found = matches(unique, common, **same, set_column="view", sets=range(n_views))
-    return MatchedViews(common, found, int(unique.attrs["gap"]))
+    unique = minimum_unique_set(common, **same, set_column="view")
+    found = matches(unique.keypoints, common, **same, set_column="view", sets=range(n_views))
+    return MatchedViews(common, found, unique.gap)
 
 
 def labelled(table: pd.DataFrame, labels: Labels) -> pd.DataFrame:

@@ -7,7 +7,7 @@ to which set (image or sampling) a detection belongs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -21,6 +21,31 @@ from keystab.matching.correspondence import (
     pairs_within,
 )
 from keystab.matching.dominating_set import minimum_dominating_set
+
+
+class UniqueSet(NamedTuple):
+    """A unique set and what is known about it.
+
+    Attributes
+    ----------
+    keypoints : DataFrame
+        Its members, see `unique_keypoints`.
+    gap : int
+        Members minus the proven lower bound; 0: a proven minimum set.
+    canonical : bool
+        Whether it is proven to be the first minimum set.
+    n_components, largest_component : int
+        Connected components of the graph of duplicates, and detections in the largest one.
+    n_milp : int
+        Integer programs that were solved.
+    """
+
+    keypoints: pd.DataFrame
+    gap: int
+    canonical: bool
+    n_components: int
+    largest_component: int
+    n_milp: int
 
 
 def unique_keypoints(
@@ -64,10 +89,8 @@ def unique_keypoints(
     Returns
     -------
     DataFrame
-        Rows of `detections` with their index and all columns, sorted by y, x, sigma. Its ``attrs``:
-        ``gap`` (members minus the proven lower bound; 0: proven minimum), ``canonical`` (whether
-        proven to be the first minimum set), ``n_components``, ``largest_component`` (detections)
-        and ``n_milp`` (integer programs solved).
+        Rows of `detections` with their index and all columns, sorted by y, x, sigma. What is proven
+        about them says `minimum_unique_set`.
 
     Raises
     ------
@@ -84,8 +107,54 @@ def unique_keypoints(
     A chain of three, 0.8 px apart: the middle one is the same as both others.
 
     >>> chain = pd.DataFrame({"y": [0.0, 0.0, 0.0], "x": [0.0, 0.8, 1.6], "sigma": 1.1})
-    >>> unique = unique_keypoints(chain, set_column=None)
-    >>> list(unique.index), unique.attrs["gap"]
+    >>> unique_keypoints(chain, set_column=None)
+         y    x  sigma
+    1  0.0  0.8    1.1
+    """
+    return minimum_unique_set(
+        detections,
+        space_tolerance,
+        scale_ratio,
+        match_sign,
+        set_column,
+        reverse_order,
+        size_limit,
+        time_limit,
+    ).keypoints
+
+
+def minimum_unique_set(
+    detections: pd.DataFrame,
+    space_tolerance: float = SPACE_TOLERANCE,
+    scale_ratio: float = SCALE_RATIO,
+    match_sign: bool = False,
+    set_column: str | None = "set",
+    reverse_order: bool = False,
+    size_limit: int = 5000,
+    time_limit: float = 60.0,
+) -> UniqueSet:
+    """Minimum unique set, and what is known about it: whether it is proven to be minimum.
+
+    Parameters
+    ----------
+    detections, space_tolerance, scale_ratio, match_sign, set_column, reverse_order, size_limit, \
+    time_limit
+        See `unique_keypoints`.
+
+    Returns
+    -------
+    UniqueSet
+
+    Raises
+    ------
+    InputError
+        As for `unique_keypoints`.
+
+    Examples
+    --------
+    >>> chain = pd.DataFrame({"y": [0.0, 0.0, 0.0], "x": [0.0, 0.8, 1.6], "sigma": 1.1})
+    >>> unique = minimum_unique_set(chain, set_column=None)
+    >>> list(unique.keypoints.index), unique.gap
     ([1], 0)
     """
     pairs = pairs_within(detections, space_tolerance, scale_ratio, match_sign)
@@ -95,15 +164,14 @@ def unique_keypoints(
     if reverse_order:
         preference = preference[::-1]
     found = minimum_dominating_set(pairs, preference, size_limit, time_limit)
-    unique = detections.iloc[found.members[np.argsort(place[found.members])]].copy()
-    unique.attrs = {
-        "gap": len(found.members) - found.lower_bound,
-        "canonical": found.canonical,
-        "n_components": found.n_components,
-        "largest_component": found.largest_component,
-        "n_milp": found.n_milp,
-    }
-    return unique
+    return UniqueSet(
+        detections.iloc[found.members[np.argsort(place[found.members])]].copy(),
+        len(found.members) - found.lower_bound,
+        found.canonical,
+        found.n_components,
+        found.largest_component,
+        found.n_milp,
+    )
 
 
 def matches(
