@@ -163,7 +163,7 @@ class Acceptance:
 
 @dataclass(frozen=True)
 class SiftFilters:
-    """SIFT as it is shipped: which refined keypoints are accepted, and its filters (figure 7)."""
+    """SIFT's own choices: which refined keypoints are accepted, and its filters (figure 7)."""
 
     max_offset: Annotated[float, Setting("refinement.max_offset", "M_offset, samples")]
     max_iterations: Annotated[int, Setting("shipped.max_iterations", "N_interp of SIFT")]

@@ -66,7 +66,7 @@ def test_a_list_of_what_is_left_out_has_its_columns(text, tmp_path):
 def test_what_is_no_ledger_is_said_in_one_line(suffix, text, tmp_path):
     path = tmp_path / f"claims.{suffix}"
     path.write_text(text)
-    with pytest.raises(InputError, match=f"claims.{suffix}: is no ledger of claims"):
+    with pytest.raises(InputError, match=f"claims.{suffix}: is no report on claims"):
         verdicts_in(path)
 
 

@@ -249,7 +249,7 @@ def test_archives_that_write_elsewhere_are_refused(clone, tmp_path):
 def test_results_that_are_here_are_checked_down_to_the_chunk(here, monkeypatch, capsys):
     monkeypatch.chdir(here.project)
     assert cli.main(["verify"]) == 0
-    assert "1 with every chunk as sealed" in capsys.readouterr().out
+    assert "1 with every chunk as recorded" in capsys.readouterr().out
     (here.project / "results/views/still/b").write_text("3,1.2\n")
     (here.project / "results/keypoints/still.csv").write_text("n_spo,found\n")
     assert cli.main(["verify"]) == 1

@@ -47,7 +47,7 @@ rule match_views:
 
 
 rule match_sift:
-    """Figure 7: stability of SIFT as it is shipped, with and without its filters."""
+    """Figure 7: stability of SIFT with its own refinement, with and without its filters."""
     input:
         views=ancient(f"{HERE}views/shipped"),
         views_digest=f"{HERE}views/shipped.sha256",

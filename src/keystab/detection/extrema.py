@@ -306,13 +306,13 @@ def extrema_of_array(
     >>> extrema_of_array(dog, 0.0)
     array([[ 1,  1,  1, -1]])
     """
-    room = 64
+    capacity = 64
     while True:
-        extrema = np.empty((room, 4), dtype=np.int64)
+        extrema = np.empty((capacity, 4), dtype=np.int64)
         count = _scan(dog, epsilon, extrema)
-        if count <= room:
+        if count <= capacity:
             break
-        room = count
+        capacity = count
     extrema = extrema[:count]
     extrema[:, 1] += offset[0]
     extrema[:, 2] += offset[1]

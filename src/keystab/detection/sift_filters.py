@@ -1,4 +1,4 @@
-"""SIFT as it is shipped: the two filters that the study turns off (section 2.1).
+"""The two filters of published SIFT that the study turns off (section 2.1).
 
 Published detectors discard extrema of low contrast and extrema on edges. The study's own detector
 has no filter of any kind; these are for comparison only.

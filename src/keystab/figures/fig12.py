@@ -44,8 +44,8 @@ TABLES = {
 
 SYMBOL = "noise"
 
-# Room between a point and the axis that a noise written beside it needs, in per cent of keypoints.
-ROOM_FOR_A_NAME = 12.0
+# Space between a point and the axis that a noise written beside it needs, in per cent of keypoints.
+SPACE_FOR_A_NAME = 12.0
 
 PAPERS_RATIO = 2.0
 """Noise of an octave over that of the next one, in the paper."""
@@ -214,7 +214,7 @@ def _draw_rule(ax: Axes, comparisons: Sequence[Comparison], colours: Colours) ->
         ax.plot([half[0]], [whole[0]], "o", color=colour, markersize=4.0, label=f"{noise:g}")
         # On the side away from the line of equality; near the origin, where the intervals of the
         # strongest noises meet and the axis leaves no room, to the right of them.
-        left = whole[0] > half[0] and half[1] > ROOM_FOR_A_NAME
+        left = whole[0] > half[0] and half[1] > SPACE_FOR_A_NAME
         at, right, ha = (half[1], -4.0, "right") if left else (half[2], 4.0, "left")
         kind: dict[str, Any] = {"bbox": {"color": "white", "pad": 0.4}, "ha": ha}
         style.direct_label(ax, at, whole[0], f"{noise:g}", colour, right, **kind)

@@ -93,14 +93,14 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         condition = grid["median_condition"]
         scale = LogNorm(condition.min(), condition.max())
         style.letter(maps[1, 1], "d", "median condition number of the Hessian")
-        judged = _heat_map(maps[1, 1], grid, "median_condition", palette.condition_map(), scale)
+        conditions = _heat_map(maps[1, 1], grid, "median_condition", palette.condition_map(), scale)
         _mark_samplings(maps[1, 1], grid, curve)
         for ax in maps[:, 1]:
             ax.set(ylabel="", yticklabels=[])
         for ax in maps[0]:
             ax.set(xlabel="", xticklabels=[])
         _colour_bar(figure, counted, maps[0, 1], "keypoints, (a) to (c)")
-        _colour_bar(figure, judged, maps[1, 1], "condition number", format="%g")
+        _colour_bar(figure, conditions, maps[1, 1], "condition number", format="%g")
         _key(maps[0, 0])
         steps, conditions = style.panels(outer[1], 1, 2)[0]
         _draw_curve(steps, curve)

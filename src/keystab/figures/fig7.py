@@ -42,7 +42,7 @@ N_INTERP = "$N_{\\mathrm{interp}}$"
 """The paper's symbols."""
 
 USUAL = {"max_offset": 0.6, "max_iterations": 2.0}
-"""The refinement that the paper settles on; its curve stands beside those of SIFT as shipped."""
+"""The refinement that the paper settles on; its curve stands beside those of SIFT."""
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
@@ -53,7 +53,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     tables : mapping
         ``fig7_curves``: stability curves at a coarse and a fine sampling; ``fig7_precision``: one
         row per sampling, kind of detection and quantity; ``fig7_counts``: one row per sampling and
-        choice; ``fig7_shipped``: curves of SIFT as shipped, ``unfiltered`` and ``filtered``.
+        choice; ``fig7_shipped``: curves of SIFT's own refinement, ``unfiltered`` and ``filtered``.
     draft : bool
         Say on the figure that its numbers come from quick settings.
 
@@ -62,8 +62,8 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     matplotlib Figure
         a, b: curves at the coarse and at the fine sampling, a row for each ``N_interp``, a curve for
         each ``M_offset``, discrete extrema dotted; c: precision of the location; d: of the scale;
-        e: numbers of keypoints seen in all views (dots) and in any (ticks); f: curves of SIFT as
-        shipped.
+        e: numbers of keypoints seen in all views (dots) and in any (ticks); f: curves of
+        SIFT's own refinement.
 
     Raises
     ------
@@ -108,10 +108,10 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         for ax, name, quantity in zip(precisions, "cd", QUANTITIES, strict=True):
             style.letter(ax, name, QUANTITIES[quantity][0])
             precision(ax, tables["fig7_precision"], quantity, medians=quantity == "location")
-        number, shipped = style.panels(outer[2], 1, 2, wspace=0.03)[0]
+        number, sift = style.panels(outer[2], 1, 2, wspace=0.03)[0]
         labels[number] = _draw_counts(number, counts[counts["n_spo"].isin(samplings)])
-        heads[shipped] = ("", "seen in all")
-        labels[shipped] = _draw_sift(shipped, tables["fig7_shipped"], curves)
+        heads[sift] = ("", "seen in all")
+        labels[sift] = _draw_sift(sift, tables["fig7_shipped"], curves)
         end_labels(labels, heads)
         return style.settle(figure, draft)
 
@@ -180,13 +180,13 @@ def _above(ax: Axes) -> dict[str, Any]:
     return place | {"fontsize": style.SMALL}
 
 
-def _draw_sift(ax: Axes, shipped: DataFrame, curves: DataFrame) -> list[EndLabel]:
-    """Draw the curves of SIFT as shipped, and for comparison the usual one of the same sampling."""
+def _draw_sift(ax: Axes, sift: DataFrame, curves: DataFrame) -> list[EndLabel]:
+    """Draw the curves of SIFT's own refinement, and beside them the usual one of its sampling."""
     style.letter(ax, "f", "SIFT as shipped")
     curve_axes(ax)
     labels = []
     for name, colour in palette.SIFT_COLOURS.items():
-        rows = shipped[shipped["shipped"] == name]
+        rows = sift[sift["shipped"] == name]
         if len(rows) == 0:
             raise InputError(f"fig7_shipped.csv: has no rows of {name}; remake the table")
         labels.append(curve(ax, rows, colour, name))

@@ -41,7 +41,7 @@ _OFFSETS = ("#04121f", "#00437a", "#0072B2", "#5AAEE0")
 """From no limit on the offset to the tightest; the third is that of "refined"."""
 
 SIFT_COLOURS = {"unfiltered": "#A8458A", "filtered": "#5b1f57"}
-"""SIFT as shipped, without and with its filters of contrast and edges (figure 7)."""
+"""SIFT with its own refinement, without and with its filters of contrast and edges (figure 7)."""
 
 METHOD_COLOURS = {"sampled": "#D55E00", "dct": "#0072B2", "discrete_analogue": "#009E73"}
 """Ways to blur (figure 1)."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keystab.errors import InputError
-from keystab.io.picture_samples import Samples, check_room
+from keystab.io.picture_samples import Samples, check_memory
 
 __all__ = ["decode", "is_netpbm", "shape"]
 
@@ -66,7 +66,7 @@ def decode(path: Path) -> Samples:
     header = _header(path)
     itemsize = 4 if header.kind in "fF" else 1 if header.maxval < 256 else 2
     plain = header.kind in "123"
-    check_room(
+    check_memory(
         header.height, header.width, header.channels * (_PLAIN_BYTES if plain else itemsize), path
     )
     body = path.read_bytes()[header.start :]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from keystab.errors import InputError
 from keystab.utils import memory
 
-__all__ = ["Samples", "check_channels", "check_room", "upright", "upright_shape"]
+__all__ = ["Samples", "check_channels", "check_memory", "upright", "upright_shape"]
 
 # What the Orientation of EXIF and TIFF asks for; all other values ask for nothing.
 _TRANSPOSED = (5, 6, 7, 8)
@@ -74,7 +74,7 @@ def upright_shape(height: int, width: int, orientation: object) -> tuple[int, in
     return (width, height) if orientation in _TRANSPOSED else (height, width)
 
 
-def check_room(height: int, width: int, pixel_bytes: float, path: Path) -> None:
+def check_memory(height: int, width: int, pixel_bytes: float, path: Path) -> None:
     """Raise unless a picture can be decoded and made grey in memory.
 
     Parameters

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from keystab.errors import InputError
 from keystab.io import netpbm_pictures, pillow_pictures, tiff_pictures
-from keystab.io.picture_samples import Samples, check_channels, check_room
+from keystab.io.picture_samples import Samples, check_channels, check_memory
 from keystab.utils.files import check_writable, written_whole
 from keystab.utils.masks import unmasked
 
@@ -237,7 +237,7 @@ def _decode_npy(path: Path) -> Samples:
         raise InputError(
             f"{path}: samples of type {dtype} have no agreed white; use unsigned integers or floats"
         )
-    check_room(shape[0], shape[1], math.prod(shape[2:]) * dtype.itemsize, path)
+    check_memory(shape[0], shape[1], math.prod(shape[2:]) * dtype.itemsize, path)
     values = np.load(path, allow_pickle=False)
     return Samples(values, float(np.iinfo(dtype).max) if dtype.kind == "u" else 1.0)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keystab.errors import InputError
-from keystab.io.picture_samples import Samples, check_room, upright, upright_shape
+from keystab.io.picture_samples import Samples, check_memory, upright, upright_shape
 
 __all__ = ["decode", "opened", "picture_samples", "shape"]
 
@@ -47,7 +47,7 @@ def decode(path: Path) -> Samples:
     with _one_picture(path) as picture:
         width, height = picture.size
         n_bytes = _SAMPLE_BYTES.get(picture.mode, 1 if len(picture.mode) == 1 else 4)
-        check_room(height, width, 3 if picture.mode == "P" else n_bytes, path)
+        check_memory(height, width, 3 if picture.mode == "P" else n_bytes, path)
         orientation = _orientation(picture, path)
         values = picture_samples(picture)
     if values.dtype.kind not in ("b", "u"):

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from keystab.errors import InputError
 from keystab.io import pillow_pictures
-from keystab.io.picture_samples import Samples, check_room, upright, upright_shape
+from keystab.io.picture_samples import Samples, check_memory, upright, upright_shape
 
 __all__ = ["SIGNATURES", "decode", "shape"]
 
@@ -59,7 +59,7 @@ def decode(path: Path) -> Samples:
         bits = page.bitspersample
         sample_bytes = page.dtype.itemsize if bits in (1, *_WHOLE_BYTES) else bits
         pixel_bytes = page.samplesperpixel * sample_bytes
-        check_room(page.imagelength, page.imagewidth, pixel_bytes, path)
+        check_memory(page.imagelength, page.imagewidth, pixel_bytes, path)
         if page.compression in _FAX | {_JPEG}:
             return _by_pillow(page, path)
         samples = _interpreted(_stored(page, path), page)

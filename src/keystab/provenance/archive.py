@@ -293,10 +293,10 @@ def _size(path: Path) -> int:
 
 
 def _digest(path: Path) -> str | None:
-    """SHA-256 of a file; of a store, that of its seal; None for what somebody deleted."""
-    seal = path.with_name(f"{path.name}.sha256")
-    if seal.is_file():
-        return file_digest(seal)
+    """SHA-256 of a file; of a store, that of its checksums; None for what somebody deleted."""
+    checksums = path.with_name(f"{path.name}.sha256")
+    if checksums.is_file():
+        return file_digest(checksums)
     return file_digest(path) if path.is_file() else None
 
 
@@ -365,9 +365,9 @@ make verify ARCHIVE=/path/to/keystab-{version}.zip RECOMPUTE=all    # everything
 |---|---:|---:|
 {rows}
 
-`left-out.csv` names each with its size and digest; that of a Zarr store is the digest of the seal
-beside it, which is in here and lists every chunk. Unpacked, Snakemake takes the study for finished
-without them. This makes one again, and what it needs:
+`left-out.csv` names each with its size and digest; that of a Zarr store is the digest of the
+checksums beside it, which are in here and name every chunk. Unpacked, Snakemake takes the study for
+finished without them. This makes one again, and what it needs:
 
 ```sh
 snakemake -j2 PATH{flag}

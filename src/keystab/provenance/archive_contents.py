@@ -77,8 +77,8 @@ def check_contents(held: Unpacked, run: Run, left_out: Mapping[str, Mapping[str,
     problems += [f"{name}: here, and in {LEFT_OUT}" for name in left_out if name in held.digests]
     known = _digests_of_inputs(records)
     for name, row in left_out.items():
-        seal = held.digests.get(f"{name}.sha256")
-        expected = {seal} if seal else known.get(name, {row["sha256"]})
+        checksums = held.digests.get(f"{name}.sha256")
+        expected = {checksums} if checksums else known.get(name, {row["sha256"]})
         rule = records[name].rule if name in records else row["rule"]
         if {row["sha256"]} != expected or row["rule"] != rule or not row["bytes"].isdecimal():
             problems.append(f"{name}: {LEFT_OUT} says otherwise than the records of the run")

@@ -23,7 +23,7 @@ _ESCAPE = re.compile(rb"\\([0-7]{1,3}|.)", re.DOTALL)
 _KEYWORDS_START = b"/Keywords ("
 _KEYWORDS = re.compile(rb"/Keywords \(((?:[^()\\]|\\.)*)\)", re.DOTALL)
 _MOST_BYTES, _MOST_CHUNKS = 100_000, 100
-"""Of a passport, which lists the tables of one figure, and of a PNG before it."""
+"""Of the metadata of a figure, which list the tables of one figure, and of a PNG before it."""
 
 
 def read_figure_metadata(path: Path | str, as_drawn: bool = False) -> FigureMetadata:
@@ -105,7 +105,7 @@ def _text_of_png(path: Path, as_drawn: bool) -> str | None:
 
 
 def _text_before_pixels(path: Path) -> str | None:
-    """Plain text of a PNG under the key of passports, if it is among the first chunks."""
+    """Plain text of a PNG under the key of metadata, if it is among the first chunks."""
     with path.open("rb") as file:
         file.seek(8)
         for _ in range(_MOST_CHUNKS):

@@ -123,20 +123,21 @@ def _compare_left_out(
     made = sorted(digests.keys() & records.keys())
     other = []
     for path in made:
-        seal = study.project / f"{path}.sha256"
+        checksums = study.project / f"{path}.sha256"
         store = (study.project / path).is_dir()
-        if file_digest(seal if store else study.project / path) != digests[path]:
-            other.append(f"{path}: {_other_chunks(source, seal, path) if store else 'other bytes'}")
+        if file_digest(checksums if store else study.project / path) != digests[path]:
+            told = _other_chunks(source, checksums, path) if store else "other bytes"
+            other.append(f"{path}: {told}")
     words = f"{len(made) - len(other)} of {len(made)} the same to the last bit"
     same_machine = alike(about, study.lock_digest)
     return Check("left out", words, other if same_machine else [], [] if same_machine else other)
 
 
-def _other_chunks(source: Path, seal: Path, path: str) -> str:
-    """Name the files of a store that are not as its archived seal says."""
+def _other_chunks(source: Path, checksums: Path, path: str) -> str:
+    """Name the files of a store that are not as its archived checksums say."""
     archived = source / f"{path}.sha256"
     if not archived.is_file():
         return "other bytes"
-    before, after = (read_sums(it.read_text(encoding="utf-8")) for it in (archived, seal))
+    before, after = (read_sums(it.read_text(encoding="utf-8")) for it in (archived, checksums))
     names = [name for name in sorted(before | after) if before.get(name) != after.get(name)]
     return f"{len(names)} of {len(before)} files differ, first {names[0]}"

@@ -187,7 +187,7 @@ def listed_in(path: Path) -> dict[str, str]:
 
 
 def check_figures(run: Run, lock: str) -> Check:
-    """Hold each figure's passport against its name, its tables, and the code and lock here.
+    """Hold each figure's metadata against its name, its tables, and the code and lock here.
 
     Parameters
     ----------
@@ -201,21 +201,21 @@ def check_figures(run: Run, lock: str) -> Check:
     for path in run.figures:
         name = run.name(path)
         try:
-            passport = read_figure_metadata(path, as_drawn=True)
+            metadata = read_figure_metadata(path, as_drawn=True)
         except InputError as error:
             problems.append(f"{name}{str(error).removeprefix(str(path))}")
             continue
-        if passport.figure not in code:
-            code[passport.figure] = code_of_figure(passport.figure)
-        if passport.figure != path.stem:
-            problems.append(f"{name}: is figure {passport.figure}")
-        if passport.version != run.about.keystab:
-            problems.append(f"{name}: drawn by another version, {passport.version[:20]!a}")
-        if passport.code is None or passport.code != code[passport.figure]:
+        if metadata.figure not in code:
+            code[metadata.figure] = code_of_figure(metadata.figure)
+        if metadata.figure != path.stem:
+            problems.append(f"{name}: is figure {metadata.figure}")
+        if metadata.version != run.about.keystab:
+            problems.append(f"{name}: drawn by another version, {metadata.version[:20]!a}")
+        if metadata.code is None or metadata.code != code[metadata.figure]:
             problems.append(f"{name}: drawn by other code than is here")
-        if passport.lock != lock:
+        if metadata.lock != lock:
             problems.append(f"{name}: drawn under another environment.lock than is here")
-        for table, digest in passport.tables.items():
+        for table, digest in metadata.tables.items():
             found = run.digest(f"{run.about.results}/tables/{table}")
             tables.add(table)
             if found != digest:
@@ -227,7 +227,7 @@ def check_figures(run: Run, lock: str) -> Check:
 
 
 def check_verdicts(run: Run, claims: Path, exact: bool) -> Check:
-    """Judge the claims again from the tables of a run and compare.
+    """Evaluate the claims again from the tables of a run and compare.
 
     Parameters
     ----------
@@ -309,12 +309,12 @@ def _but_for_rounding(one: Path, other: Path) -> bool:
 
 
 def verdicts_in(path: Path) -> dict[str, str]:
-    """Verdicts by the names of claims, from a ledger in any of its forms.
+    """Verdicts by the names of claims, from a report on claims in any of its forms.
 
     Raises
     ------
     InputError
-        If it is no ledger. The name of the file is part of the text.
+        If it is no such report. The name of the file is part of the text.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -323,7 +323,7 @@ def verdicts_in(path: Path) -> dict[str, str]:
         found = [("", None)]
     texts = all(isinstance(it, str) for pair in found for it in pair)
     if not texts or len({name for name, _ in found}) < len(found):
-        raise InputError(f"{path}: is no ledger of claims")
+        raise InputError(f"{path}: is no report on claims")
     return dict(found)
 
 

@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from keystab.errors import InputError
-from keystab.io.checksums import verify as verify_seal
+from keystab.io.checksums import verify as verify_store
 from keystab.provenance.archive import about_study, is_final
 from keystab.provenance.archive_contents import check_contents, check_sources
 from keystab.provenance.archived_settings import differing, place_settings, settings_of
@@ -254,7 +254,7 @@ def check_here(study: Study) -> tuple[list[Check], bool]:
     -------
     checks : list of Check
         What is missing, and what would run and why; whether files are those that Snakemake read
-        when it made others from them; whether every chunk of every store is as sealed; whether
+        when it made others from them; whether every chunk of every store is as recorded; whether
         figures, tables and verdicts are as the run ended and follow from one another; and how they
         compare with the committed reference.
     sound : bool
@@ -366,7 +366,7 @@ def _check_stores(records: Mapping[str, Record], project: Path) -> Check:
     problems = []
     for name in stores:
         try:
-            verify_seal(project / name, project / f"{name}.sha256")
+            verify_store(project / name, project / f"{name}.sha256")
         except InputError as error:
             problems.append(str(error).replace(f"{project}/", ""))
-    return Check("stores", f"{len(stores)} with every chunk as sealed", problems)
+    return Check("stores", f"{len(stores)} with every chunk as recorded", problems)

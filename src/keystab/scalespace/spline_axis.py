@@ -70,11 +70,11 @@ class SplineAxis:
     def block(self, start: int, stop: int) -> Block:
         """See `keystab.scalespace.axis.AxisOperator.block`."""
         firsts, factors = [], []
-        room = np.empty((stop - start, self.n_columns))
+        buffer = np.empty((stop - start, self.n_columns))
         for blur in range(self.rows.reach.size):
-            first, width = fill_rows(self.rows, blur, start * self.stride, self.stride, room)
+            first, width = fill_rows(self.rows, blur, start * self.stride, self.stride, buffer)
             firsts.append(first)
-            factors.append(room[:, :width].copy())
+            factors.append(buffer[:, :width].copy())
         return Block.of(None, firsts, factors)
 
 
@@ -307,10 +307,10 @@ def _ringing_reach(rows: SplineRows, blur: int, n_columns: int) -> int:
 
 def _full_rows(rows: SplineRows, blur: int, start: int, stop: int, n_columns: int) -> np.ndarray:
     """Rows `start` to `stop` with all columns."""
-    room = np.empty((stop - start, n_columns))
-    first, width = fill_rows(rows, blur, start, 1, room)
-    full = np.zeros_like(room)
-    full[:, first : first + width] = room[:, :width]
+    buffer = np.empty((stop - start, n_columns))
+    first, width = fill_rows(rows, blur, start, 1, buffer)
+    full = np.zeros_like(buffer)
+    full[:, first : first + width] = buffer[:, :width]
     return full
 
 

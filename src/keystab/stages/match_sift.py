@@ -1,4 +1,4 @@
-"""Match the keypoints of SIFT as shipped, with and without its filters (figure 7)."""
+"""Match the keypoints of SIFT with its own refinement, with and without its filters (figure 7)."""
 
 from pathlib import Path
 

@@ -198,7 +198,7 @@ def _verdict(claim: Claim, found: Mapping[str, Measured]) -> tuple[str, str]:
 
 
 def outcomes_of(claims: Iterable[Claim], tables: Mapping[str, pd.DataFrame]) -> list[Outcome]:
-    """Judge claims, in their order."""
+    """Evaluate claims, in their order."""
     return [outcome_of(claim, tables) for claim in claims]
 
 

@@ -1,1 +1,1 @@
-"""What any room may use: checks of arguments, memory, progress, files."""
+"""What any other subpackage may use: checks of arguments, memory, progress, files."""
