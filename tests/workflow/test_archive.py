@@ -19,7 +19,14 @@ from project import QUICK
 from keystab.cli import main as cli
 from keystab.errors import InputError
 from keystab.io.figure_metadata import PNG_KEY
-from keystab.provenance import archive, lineage, recomputation, result_checks, verification
+from keystab.provenance import (
+    archive,
+    lineage,
+    recomputation,
+    result_checks,
+    run_comparison,
+    verification,
+)
 from keystab.provenance.run_description import ABOUT, LEFT_OUT, SUMS
 from keystab.provenance.study_folder import Study
 from keystab.provenance.unpacking import Unpacked, unpacked
@@ -341,10 +348,10 @@ def test_recomputing_gives_the_same_bits_or_says_what_differs(packed, clone, tmp
         made = tmp_path / "made"
         shutil.copytree(source / "results/tables", made / "tables")
         (made / "tables/fig1.csv").write_text("n_spo,found\n3,1.1\n5,0.2500000001\n7,\n")
-        check = result_checks.compare_tables(source, made, about["lock"])
+        check = run_comparison.compare_tables(source, made, about["lock"])
         assert check.problems == [] and "by 1e-10" in check.notes[0]
         (made / "tables/fig1.csv").write_text("n_spo,found\n3,1.1\n5,0.2501\n7,\n")
-        assert "by 0.0001" in result_checks.compare_tables(source, made, about["lock"]).problems[0]
+        assert "by 0.0001" in run_comparison.compare_tables(source, made, about["lock"]).problems[0]
         with pytest.raises(InputError, match="fig9: no figure; give fig1, figS3 or all"):
             recomputation.recompute(held, clone, ["fig9"], 1)
 

@@ -11,13 +11,8 @@ from keystab.io.checksums import read_sums
 from keystab.provenance import table_differences
 from keystab.provenance.archived_settings import place_settings
 from keystab.provenance.lineage import file_digest
-from keystab.provenance.result_checks import (
-    Check,
-    alike,
-    compare_tables,
-    compare_verdicts,
-    left_out_digests,
-)
+from keystab.provenance.result_checks import Check, left_out_digests
+from keystab.provenance.run_comparison import alike, compare_tables, compare_verdicts
 from keystab.provenance.run_description import About
 from keystab.provenance.snakemake_records import Record, read_records
 from keystab.provenance.study_folder import Study

@@ -26,16 +26,15 @@ from keystab.provenance.lineage import file_digest, printable
 from keystab.provenance.result_checks import (
     Check,
     Run,
-    alike,
     check_columns,
     check_figures,
     check_final,
-    check_reference,
     check_verdicts,
     left_out_digests,
     left_out_rows,
     listed_in,
 )
+from keystab.provenance.run_comparison import alike, check_reference
 from keystab.provenance.run_description import ABOUT, LEFT_OUT, SUMS
 from keystab.provenance.snakemake_records import (
     Record,
