@@ -343,6 +343,19 @@ def test_figure_7_shows_sift_as_shipped_beside_the_usual_refinement():
     assert_array_equal(line(ax, "as in (a)")[1], usual["percentage_of_unique"])
 
 
+def test_figure_7_takes_the_usual_refinement_from_its_tables():
+    tables = figure_tables.tables(7)
+    precision = tables["fig7_precision"].copy()
+    refined = precision["detections"] == "refined"
+    precision.loc[refined, ["max_offset", "max_iterations"]] = (np.inf, 1.0)
+    figure = fig7.draw(tables | {"fig7_precision": precision})
+    usual = tables["fig7_curves"].query("n_spo == 3 and max_offset == inf and max_iterations == 1")
+    assert_array_equal(line(panel(figure, "f"), "as in (a)")[1], usual["percentage_of_unique"])
+    precision.loc[refined, "max_offset"] = 0.7  # of no curve
+    with pytest.raises(InputError, match="not of one refinement"):
+        fig7.draw(tables | {"fig7_precision": precision})
+
+
 def test_figure_7_draws_a_picture_of_which_sift_keeps_nothing():
     tables = figure_tables.tables(7)
     shipped = tables["fig7_shipped"].copy()

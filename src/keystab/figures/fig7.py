@@ -31,7 +31,7 @@ CHOICE = ("n_spo", "detections", "max_offset", "max_iterations")
 
 TABLES = {
     "fig7_curves.csv": (*CHOICE, *CURVE),
-    "fig7_precision.csv": PRECISION,
+    "fig7_precision.csv": (*PRECISION, "max_offset", "max_iterations"),
     "fig7_counts.csv": (*CHOICE, "n_unique", "n_always"),
     "fig7_shipped.csv": ("shipped", *CURVE),
 }
@@ -41,9 +41,6 @@ M_OFFSET = "$M_{\\mathrm{offset}}$"
 N_INTERP = "$N_{\\mathrm{interp}}$"
 """The paper's symbols."""
 
-USUAL = {"max_offset": 0.6, "max_iterations": 2.0}
-"""The refinement that the paper settles on; its curve stands beside those of SIFT."""
-
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
     """Draw stability curves for all limits of the refinement, precision, counts, and SIFT's curves.
@@ -52,7 +49,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     ----------
     tables : mapping
         ``fig7_curves``: stability curves at a coarse and a fine sampling; ``fig7_precision``: one
-        row per sampling, kind of detection and quantity; ``fig7_counts``: one row per sampling and
+        row per sampling, kind of detection and quantity, with the refinement that is usual; ``fig7_counts``: one row per sampling and
         choice; ``fig7_shipped``: curves of SIFT's own refinement, ``unfiltered`` and ``filtered``.
     draft : bool
         Say on the figure that its numbers come from quick settings.
@@ -111,7 +108,9 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         number, sift = style.panels(outer[2], 1, 2, wspace=0.03)[0]
         labels[number] = _draw_counts(number, counts[counts["n_spo"].isin(samplings)])
         heads[sift] = ("", "seen in all")
-        labels[sift] = _draw_sift(sift, tables["fig7_shipped"], curves)
+        labels[sift] = _draw_sift(
+            sift, tables["fig7_shipped"], _usual(curves, tables["fig7_precision"])
+        )
         end_labels(labels, heads)
         return style.settle(figure, draft)
 
@@ -180,8 +179,22 @@ def _above(ax: Axes) -> dict[str, Any]:
     return place | {"fontsize": style.SMALL}
 
 
-def _draw_sift(ax: Axes, sift: DataFrame, curves: DataFrame) -> list[EndLabel]:
-    """Draw the curves of SIFT's own refinement, and beside them the usual one of its sampling."""
+def _usual(curves: DataFrame, precision: DataFrame) -> DataFrame:
+    """Return the curve of the coarse sampling with the refinement whose precision is drawn."""
+    limits = ["max_offset", "max_iterations"]
+    usual = precision[precision["detections"] == "refined"][limits].drop_duplicates()
+    coarse = curves[curves["n_spo"] == curves["n_spo"].min()]
+    found: DataFrame = coarse.merge(usual, on=limits)
+    if len(usual) != 1 or found.empty:
+        raise InputError(
+            "fig7_precision.csv: its refined keypoints are not of one refinement that "
+            "fig7_curves.csv has; remake both tables"
+        )
+    return found
+
+
+def _draw_sift(ax: Axes, sift: DataFrame, usual: DataFrame) -> list[EndLabel]:
+    """Draw the curves of SIFT's own refinement, and beside them the usual one."""
     style.letter(ax, "f", "SIFT as shipped")
     curve_axes(ax)
     labels = []
@@ -190,12 +203,8 @@ def _draw_sift(ax: Axes, sift: DataFrame, curves: DataFrame) -> list[EndLabel]:
         if len(rows) == 0:
             raise InputError(f"fig7_shipped.csv: has no rows of {name}; remake the table")
         labels.append(curve(ax, rows, colour, name))
-    usual = curves[curves["n_spo"] == curves["n_spo"].min()]
-    for column, value in USUAL.items():
-        usual = usual[usual[column] == value]
-    if len(usual):
-        colour = palette.DETECTION_COLOURS["refined"]
-        labels.append(curve(ax, usual, colour, "as in (a)", linewidth=0.8))
+    colour = palette.DETECTION_COLOURS["refined"]
+    labels.append(curve(ax, usual, colour, "as in (a)", linewidth=0.8))
     return labels
 
 

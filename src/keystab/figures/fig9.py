@@ -24,7 +24,8 @@ TABLES = {
 """Files read, with the columns that they must have."""
 
 MOST = 0.8
-"""A keypoint is detected with most ratios if with more than this share of them."""
+"""A keypoint is detected with most ratios if with more than this share of them, the one that the
+paper names."""
 
 TICKS = (30, 20, 14, 10, 7, 5, 3, 2)
 """Values of n at which the ratio 2^(1/n) is written on the axis."""
