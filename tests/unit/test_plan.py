@@ -143,6 +143,27 @@ def test_variants_that_differ_in_the_tolerance_share_their_extrema():
     assert by_name["closer"].set == "closer"
 
 
+def test_variants_are_said_in_words_that_follow_the_settings():
+    assert dict(zip(study()["floor"]["variants"], plan.differences(study()), strict=True)) == {
+        "usual": "no tolerance",
+        "epsilon_1e7": "tolerance 1.19e-7",
+        "epsilon_1e6": "tolerance 1e-6",
+        "epsilon_1e5": "tolerance 1e-5",
+        "cosine": "cosine series, not spline",
+        "float64_view": "view in 64 bits",
+        "bits_16": "view in 16 bits",
+        "bits_8": "view in 8 bits",
+        "single": "single precision",
+        "single_255": "single precision, range 255",
+        "range_255": "tolerance 1e-6, range 255",
+        "closer": "S = 4",
+        "closer_1e6": "S = 4, tolerance 1e-6",
+    }
+    other = "{sets: {closer: {step: 5}}, floor: {variants: {usual: null, bits_8: {bits: 6}}}}"
+    words = plan.differences(study(other))
+    assert "S = 5" in words and "view in 6 bits" in words and len(words) == 12
+
+
 def test_single_precision_alone_is_told_its_tolerance_and_its_range():
     full = study("{floor: {variants: {single_255: {epsilon: 0.5}, range_255: {epsilon: 0.5}}}}")
     asked = [("single_255", "epsilon"), ("single_255", "grey_range"), ("range_255", "epsilon")]

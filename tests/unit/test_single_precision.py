@@ -85,6 +85,9 @@ def test_settled_rates_are_weighted_by_their_detections():
     assert np.isnan(floor_summary(COUNTS, pd.Series([], dtype=float), 99)["new_rate"].item())
 
 
+WORDS = ["no tolerance", "tolerance 2e-6", "view in 9 bits"]
+
+
 def figure_floor_tables(names):
     rates = [
         {"variant": name, "n_spo": n, "new_rate": r, "new_low": r / 2, "new_high": 2 * r}
@@ -95,6 +98,7 @@ def figure_floor_tables(names):
     return {
         "floor_rates": pd.DataFrame(rates),
         "floor_summary": pd.concat([summary.assign(variant=name) for name in names]),
+        "floor_variants": pd.DataFrame({"variant": names, "differs_in": WORDS[: len(names)]}),
     }
 
 
@@ -103,10 +107,11 @@ def test_the_figure_shows_every_variant():
     panels = {ax.get_label(): ax for ax in figure.axes}
     assert set(panels) == {"a", "b", "c"}
     labels = [text.get_text() for text in panels["b"].get_yticklabels()]
-    assert labels == ["no tolerance", "tolerance 1e-6", "of_my_own"]
+    assert labels == ["no tolerance", "tolerance 2e-6", "of_my_own"]
     lines = {line.get_label(): line for line in panels["a"].lines}
     assert lines["usual"].get_ydata().tolist() == [10.0, 5.0]
     assert "of_my_own" not in lines
+    assert "2e-6" in {text.get_text() for text in panels["a"].texts}
 
 
 def test_the_figure_leaves_out_a_tolerance_that_no_extremum_exceeds():

@@ -157,6 +157,7 @@ rule match_variants:
     output:
         rates=f"{HERE}tables/floor_rates.csv",
         summary=f"{HERE}tables/floor_summary.csv",
+        variants=f"{HERE}tables/floor_variants.csv",
     log:
         f"{LOG}match_variants.log",
     benchmark:
@@ -170,6 +171,7 @@ rule match_variants:
             parameters.Same,
             parameters.Compared,
             names=column("variant", plan.variants),
+            differences=of(plan.differences),
             tolerances=column("tolerance", plan.variants),
         ),
         # Which extrema belong to which variant: Snakemake compares inputs without their order.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,28 +29,18 @@ TABLES = {
         "low_always",
         "high_always",
     ),
+    "floor_variants.csv": ("variant", "differs_in"),
 }
 """Files read, with the columns that they must have."""
 
 FLOOR, ALWAYS = 10.0, 20.0
 """Per cent: the paper's rates at fine samplings, and its share of keypoints found at all."""
 
-NAMES = {
-    "usual": "no tolerance",
-    "epsilon_1e7": "tolerance 1.19e-7",
-    "epsilon_1e6": "tolerance 1e-6",
-    "epsilon_1e5": "tolerance 1e-5",
-    "cosine": "cosine series, not spline",
-    "float64_view": "view in 64 bits",
-    "bits_16": "view in 16 bits",
-    "bits_8": "view in 8 bits",
-    "single": "single precision",
-    "single_255": "single precision, range 255",
-    "range_255": "tolerance 1e-6, range 255",
-    "closer": "S = 4",
-    "closer_1e6": "S = 4, tolerance 1e-6",
-}
-"""Variants of the settings by name, in words; others go by their own name."""
+DESCRIBED = (
+    *("usual", "epsilon_1e7", "epsilon_1e6", "epsilon_1e5", "cosine", "float64_view", "bits_16"),
+    *("bits_8", "single", "single_255", "range_255", "closer", "closer_1e6"),
+)
+"""Variants that are named by what they differ in; others go by their own name."""
 
 DRAWN = ("epsilon_1e5", "epsilon_1e6", "epsilon_1e7", "usual")
 """Variants whose rates are drawn against the sampling."""
@@ -61,7 +52,8 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     Parameters
     ----------
     tables : mapping
-        ``floor_rates``: one row per variant and sampling; ``floor_summary``: one row per variant.
+        ``floor_rates``: one row per variant and sampling; ``floor_summary``: one row per variant;
+        ``floor_variants``: what each differs in, in words.
     draft : bool
         Say on the figure that its numbers come from quick settings.
 
@@ -79,17 +71,19 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     """
     check_tables(tables, TABLES)
     summary = tables["floor_summary"]
+    known = tables["floor_variants"].set_index("variant")["differs_in"].to_dict()
+    names = {name: known[name] for name in DESCRIBED if name in known}
     with style.context():
         figure = style.new_figure(0.19 * len(summary) + 1.3)
         grid = figure.add_gridspec(1, 3, width_ratios=(1.2, 1.0, 0.6), wspace=0.03)
         rates, settled, always = (figure.add_subplot(cell) for cell in grid)
-        _draw_rates(rates, tables["floor_rates"])
-        _draw_settled(settled, summary)
+        _draw_rates(rates, tables["floor_rates"], names)
+        _draw_settled(settled, summary, names)
         _draw_always(always, summary)
         return style.settle(figure, draft)
 
 
-def _draw_rates(ax: Axes, rates: DataFrame) -> None:
+def _draw_rates(ax: Axes, rates: DataFrame, names: Mapping[str, str]) -> None:
     """Draw the rates of new extrema against the sampling."""
     style.letter(ax, "a", "new extrema, by tolerance")
     shown = [name for name in DRAWN if (rates["variant"] == name).any()]
@@ -102,7 +96,7 @@ def _draw_rates(ax: Axes, rates: DataFrame) -> None:
         rate, low, high = (100 * rows[f"new_{part}"].to_numpy() for part in ("rate", "low", "high"))
         ax.fill_between(n_spo, low, high, color=colour, alpha=0.15, linewidth=0)
         ax.plot(n_spo, rate, "o-", color=colour, label=name)
-        text = NAMES[name].removeprefix("tolerance ").replace("no tolerance", "none")
+        text = names.get(name, name).removeprefix("tolerance ").replace("no tolerance", "none")
         up = {"epsilon_1e7": 4.0, "usual": -4.0}.get(name, 0.0)  # these two all but coincide
         style.direct_label(ax, n_spo[-1], rate[-1], text, colour, right=5.0, up=up, ha="left")
     ax.axhline(FLOOR, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=1)
@@ -115,7 +109,7 @@ def _draw_rates(ax: Axes, rates: DataFrame) -> None:
     style.finish_axes(ax)
 
 
-def _draw_settled(ax: Axes, summary: DataFrame) -> None:
+def _draw_settled(ax: Axes, summary: DataFrame, names: Mapping[str, str]) -> None:
     """Draw the rates at fine samplings, a line per variant."""
     style.letter(ax, "b", "at fine samplings")
     place = np.arange(len(summary))
@@ -138,7 +132,7 @@ def _draw_settled(ax: Axes, summary: DataFrame) -> None:
             ha="right",
         )
     _guide(ax, FLOOR)
-    ax.set_yticks(place, [NAMES.get(name, name) for name in summary["variant"]])
+    ax.set_yticks(place, [names.get(name, name) for name in summary["variant"]])
     ax.set_ylim(len(summary) - 0.5, -1.0)
     ax.set_xlim(left=0.0)
     ax.set_xlabel("extrema (%)")

@@ -65,6 +65,8 @@ Comparison
     assumed_blur : camera blur that was assumed, pixels
     kappa : ratio of the two blurs
     tolerances : least difference in each variant, of grey values in [0, 1]; -1 where it was applied
+    differences : what each variant differs in, in words
+    variants : table of these words
     settles_at : n_spo from which rates are averaged
     rates : table of rates of new and lost extrema
 

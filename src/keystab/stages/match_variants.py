@@ -11,6 +11,7 @@ def main(
     views: list[Store],
     extrema: list[Path],
     names: list[str],
+    differences: list[str],
     tolerances: list[float],
     n_spo: list[int],
     settles_at: int,
@@ -20,15 +21,18 @@ def main(
     *,
     rates: Path,
     summary: Path,
+    variants: Path,
 ) -> None:
-    """Read the extrema of every variant; write rates against n_spo, and a summary."""
+    """Read the extrema of every variant; write rates against n_spo, a summary, and words."""
+    import pandas as pd
+
     from keystab.experiments.sampling_stability import (
         change_counts,
         floor_summary,
         keypoints_of_samplings,
     )
     from keystab.experiments.view_stability import labelled
-    from keystab.io.tables import read_table
+    from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import balanced_delta
     from keystab.stages._compared import inside
@@ -47,6 +51,7 @@ def main(
         means = floor_summary(counts, stability, settles_at)
         summaries.append(labelled(means, {"variant": name}))
     write_joined(rate_tables, rates)
+    write_table(pd.DataFrame({"variant": names, "differs_in": differences}), variants)
     print(write_joined(summaries, summary).to_string(index=False))
 
 

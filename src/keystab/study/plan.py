@@ -6,6 +6,7 @@ All functions are pure. They take the settings of one scene as `keystab.study.sc
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -67,7 +68,7 @@ FIGURES = {
     # blobs, whose scale is known
     "figS4": Figure(("figS4.csv",), of_scene=False),
     # why extrema come and go at any density
-    "floor": Figure(("floor_rates.csv", "floor_summary.csv")),
+    "floor": Figure(("floor_rates.csv", "floor_summary.csv", "floor_variants.csv")),
     # detections against the true extrema
     "truth": Figure(
         (
@@ -288,6 +289,31 @@ def variants(settings: Settings) -> list[Variant]:
 def variant(settings: Settings, name: str) -> list[Variant]:
     """One variant, as the only one of a list."""
     return [each for each in variants(settings) if each.variant == name]
+
+
+def differences(settings: Settings) -> list[str]:
+    """Say in what each variant differs from the usual one, which has no tolerance, in words."""
+    sets, all_variants = settings["sets"], settings["floor"]["variants"]
+    usual = all_variants.get("usual") or next(iter(all_variants.values()))
+    before = sets[usual["set"]]
+    found = []
+    for own in all_variants.values():
+        views, bits = sets[own["set"]], own["bits"]
+        tolerance = re.sub("e-0*", "e-", f"{own['epsilon']:g}")
+        parts = {
+            f"S = {views['step'][0]:g}": views["step"][0] != before["step"][0],
+            f"view in {views['dtype'].removeprefix('float')} bits": views["dtype"]
+            != before["dtype"],
+            f"view in {bits} bits": bits is not None,
+            f"{own['oversampling']} series, not {usual['oversampling']}": own["oversampling"]
+            != usual["oversampling"],
+            "single precision": own["arithmetic"] == "float32",
+            f"tolerance {tolerance}": own["epsilon"] > 0,
+            f"range {own['grey_range']:g}": own["grey_range"] != 1,
+        }
+        words = [part for part, differs in parts.items() if differs]
+        found.append(", ".join(words) or "no tolerance")
+    return found
 
 
 def of_single_precision(settings: Settings, name: str, key: str) -> float:
