@@ -247,8 +247,7 @@ def diffraction_mtf(frequency: ArrayLike) -> Array:
     [1.0, 0.391, 0.0, 0.0]
     """
     f = np.minimum(np.asarray(frequency, dtype=np.float64), 1.0)
-    mtf: NDArray[np.float64] = 2 / np.pi * (np.arccos(f) - f * np.sqrt(1 - f**2))
-    return mtf
+    return np.asarray(2 / np.pi * (np.arccos(f) - f * np.sqrt(1 - f**2)))
 
 
 def lens_transfer(frequency: ArrayLike, w20: float = 0.0, w40: float = 0.0) -> Array:
