@@ -26,6 +26,7 @@ _HOME = {
     "balanced_delta": "scalespace.sampling",
     "detect_keypoints": "detection.detector",
     "fit_psf": "camera.psf_fit",
+    "keypoint_uncertainty": "prediction.uncertainty",
     "occurrence": "matching.unique_keypoints",
     "open_scale_space": "io.scale_space_store",
     "open_views": "io.view_store",

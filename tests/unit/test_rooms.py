@@ -26,7 +26,7 @@ ROOMS = {
     "detection": "root utils scalespace io",
     "evaluation": "root utils matching",  # knows no detector, and so can audit any
     "truth": "root utils scalespace camera detection",
-    "prediction": "root scalespace",
+    "prediction": "root utils scalespace detection",
     "experiments": "root utils scalespace camera matching detection evaluation prediction",
     "study": "root utils scalespace camera io matching evaluation",
     "provenance": "root utils io evaluation study",
