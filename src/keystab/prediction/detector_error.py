@@ -93,7 +93,7 @@ def detector_error(
     --------
     >>> error = detector_error(np.array([0, 1]), 15, 0.0927, 1.1, refined=True)
     >>> error.location.round(4).tolist(), error.log_sigma.round(4).tolist(), round(error.recall, 3)
-    ([0.0074, 0.0148], [0.0024, 0.0024], 0.995)
+    ([0.0039, 0.0079], [0.0013, 0.0013], 0.995)
     """
     scales, steps = np.log(_MEASURED[:, 0]), np.log(_MEASURED[:, 1] / _SIGMA_MIN)
     recall, location, log_sigma = _MEASURED[:, 5:8].T if refined else _MEASURED[:, 2:5].T

@@ -121,7 +121,7 @@ def keypoint_uncertainty(
     >>> noise = 0.01 * np.random.default_rng(0).standard_normal(blob.shape)
     >>> found = keypoint_uncertainty(blob + noise, camera_blur=0.8, noise=0.01)
     >>> found.loc[found["value"].idxmin(), ["std_y", "std_x", "survival"]].round(3).tolist()
-    [0.014, 0.014, 0.995]
+    [0.013, 0.013, 0.995]
     """
     array = checked_image(image)
     validation.boolean("noise_free", noise_free)
