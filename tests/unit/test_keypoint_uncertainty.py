@@ -135,7 +135,7 @@ def one_way_cubic(slope, curvature, third):
     jet[0, 9], jet[0, 19] = -curvature, third
     noise = np.zeros((1, len(ORDERS), len(ORDERS)))
     noise[0, 3, 3] = slope**2
-    return jet, np.ones(1), noise
+    return jet, np.ones(1), noise, np.full((1, 2), 0.05)
 
 
 def test_without_a_fold_in_reach_the_shift_is_the_gradient_over_the_curvature():
@@ -154,6 +154,18 @@ def test_extrema_die_where_the_gradient_passes_the_fold(third):
     # On the other side the extremum is at -0.5 for a g far beyond what is drawn.
     said = norm.cdf(curvature**2 / (2 * third) / slope)
     assert outcome.survival[0] == pytest.approx(said, abs=0.03)
+
+
+@pytest.mark.parametrize(("angle", "seen"), [(0.0, 0.0), (np.pi / 8, 1.0), (np.pi / 4, 0.0)])
+def test_a_saddle_counts_where_all_neighbours_lie_on_its_steep_sides(angle, seen):
+    # Curvature -1 across a ridge at an angle to the grid, and 0.03 along it: 22.5 degrees off the
+    # nearest direction of the grid, cos**2 x 0.03 - sin**2 is negative.
+    jet, sign, _, grid = one_way_cubic(0.0, 1.0, 0.0)
+    ridge = np.array([np.cos(angle), np.sin(angle)])
+    hessian = -np.eye(2) + 1.03 * np.outer(ridge, ridge)
+    jet[0, 7], jet[0, 8], jet[0, 9] = hessian[0, 0], hessian[0, 1], hessian[1, 1]
+    outcome = after_noise(jet, sign, np.zeros((1, len(ORDERS), len(ORDERS))), grid)
+    assert outcome.survival[0] == seen
 
 
 # -------------------------------------------------------------------------------------------------

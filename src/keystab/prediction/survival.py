@@ -18,6 +18,11 @@ of that is one number per coordinate.
 From each of a fixed set of quasi-random draws of z and :math:`J_2`, the extremum of the cubic with
 these derivatives is climbed to. The share of draws whose extremum lies within `RADIUS` is the
 survival, and their second moments are the covariance of the shift.
+
+A detector looks at the 26 neighbours of a sample, so that it takes a saddle for an extremum where
+all of these lie on its steep sides: along a ridge askew to the grid. Therefore a stationary point
+counts as an extremum where the curvature has the sign along the 13 directions of the grid, and not
+along all.
 """
 
 from __future__ import annotations
@@ -70,7 +75,10 @@ class Outcome(NamedTuple):
 
 
 def after_noise(
-    jets: NDArray[np.float64], sign: NDArray[np.float64], noise: NDArray[np.float64]
+    jets: NDArray[np.float64],
+    sign: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    grid: NDArray[np.float64],
 ) -> Outcome:
     """Outcome for the extrema of a view without noise, in a shot with noise.
 
@@ -82,6 +90,8 @@ def after_noise(
         +1 for maxima, -1 for minima.
     noise : ndarray, shape (n, 20, 20)
         Covariance of the derivatives of the shot's noise.
+    grid : ndarray, shape (n, 2)
+        Steps of the detector's grid in ln sigma and in y/sigma.
 
     Returns
     -------
@@ -91,13 +101,16 @@ def after_noise(
     mean = _at_extremum(jets)
     root = np.asarray(np.linalg.cholesky(_regular(noise)), np.float64)
     certain = np.ones((len(jets), 1))
-    return _drawn(root, np.zeros((len(jets), 1, _N)), certain[:, :, None], certain, mean, sign)
+    return _drawn(
+        root, np.zeros((len(jets), 1, _N)), certain[:, :, None], certain, mean, sign, grid
+    )
 
 
 def among_scenes(
     jets: NDArray[np.float64],
     sign: NDArray[np.float64],
     noise: NDArray[np.float64],
+    grid: NDArray[np.float64],
     level: NDArray[np.float64],
     kappa: float,
 ) -> Outcome:
@@ -105,7 +118,7 @@ def among_scenes(
 
     Parameters
     ----------
-    jets, sign, noise
+    jets, sign, noise, grid
         See `after_noise`; the derivatives are those seen, noise included.
     level : ndarray, shape (n,)
         Standard deviation of the noise of a pixel, above 0.
@@ -129,7 +142,7 @@ def among_scenes(
     cumulative = np.cumsum(weight / weight.sum(axis=1, keepdims=True), axis=1)
     share = z / total
     spread = np.sqrt(power * (1 + share))
-    return _drawn(root @ axes, share * seen, spread, cumulative, np.zeros_like(jets), sign)
+    return _drawn(root @ axes, share * seen, spread, cumulative, np.zeros_like(jets), sign, grid)
 
 
 def _at_extremum(jets: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -165,6 +178,7 @@ def _drawn(
     cumulative: NDArray[np.float64],
     offset: NDArray[np.float64],
     sign: NDArray[np.float64],
+    grid: NDArray[np.float64],
 ) -> Outcome:
     """Outcome when jets are offset + basis (mean + spread times normal numbers).
 
@@ -173,7 +187,7 @@ def _drawn(
     spread = np.broadcast_to(spread, mean.shape)
     count = np.empty(len(sign))
     moments = np.empty((len(sign), 3, 3))
-    _climb_all(basis, mean, spread, cumulative, offset, sign, _draws(), count, moments)
+    _climb_all(basis, mean, spread, cumulative, offset, sign, grid, _draws(), count, moments)
     missing = np.maximum(_FEW - count, 0)[:, None, None]
     moments += missing * _BALL * np.eye(3)
     moments /= np.maximum(count, _FEW)[:, None, None]
@@ -181,7 +195,7 @@ def _drawn(
 
 
 @njit(cache=True, nogil=True)
-def _climb_all(basis, mean, spread, cumulative, offset, sign, draws, count, moments):  # noqa: PLR0913
+def _climb_all(basis, mean, spread, cumulative, offset, sign, grid, draws, count, moments):  # noqa: PLR0913
     size = mean.shape[2]
     place, jet, coordinate = np.empty(3), np.empty(size), np.empty(size)
     moments[:] = 0.0
@@ -197,7 +211,7 @@ def _climb_all(basis, mean, spread, cumulative, offset, sign, draws, count, mome
                 jet[i] = offset[point, i]
                 for m in range(size):
                     jet[i] += basis[point, i, m] * coordinate[m]
-            if _climb(jet, sign[point], place):
+            if _climb(jet, sign[point], grid[point], place):
                 count[point] += 1
                 for i in range(3):
                     for m in range(3):
@@ -205,7 +219,7 @@ def _climb_all(basis, mean, spread, cumulative, offset, sign, draws, count, mome
 
 
 @njit(cache=True, nogil=True)
-def _climb(jet, sign, place):
+def _climb(jet, sign, grid, place):
     """Climb to the extremum of a cubic nearest to the origin, and say whether it is near."""
     place[:] = 0.0
     g, h = np.empty(3), np.empty((3, 3))
@@ -215,10 +229,11 @@ def _climb(jet, sign, place):
         _slopes(jet, -sign, place, g, h)  # of -s w, to be minimised
         shift = 0.0
         size = abs(h[0, 0]) + abs(h[1, 1]) + abs(h[2, 2]) + 1e-300
-        definite = True
-        while not _solved(h, shift, g, step):
-            definite = False
-            shift = max(2.0 * shift, 0.05 * size)
+        settled = True
+        if not _solved(h, shift, g, step):
+            settled = _stands_out(h, grid) and _stationary(h, g, step)
+            while not settled and not _solved(h, shift, g, step):
+                shift = max(2.0 * shift, 0.05 * size)
         length = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
         factor = min(1.0, 0.2 / length) if length > 0 else 1.0
         far = 0.0
@@ -227,9 +242,41 @@ def _climb(jet, sign, place):
             far += place[i] ** 2
         if far > 2.25 * radius2:
             return False
-        if definite and length < 1e-3:
+        if settled and length < 1e-3:
             return far < radius2
     return False
+
+
+@njit(cache=True, nogil=True)
+def _stands_out(h, grid):
+    """Whether a stationary point is an extremum among its 26 neighbours on a grid."""
+    for code in range(14, 27):  # one of each pair of opposite neighbours
+        a = (code // 9 - 1) * grid[0]
+        b = (code // 3 % 3 - 1) * grid[1]
+        c = (code % 3 - 1) * grid[1]
+        along = h[0, 0] * a * a + h[1, 1] * b * b + h[2, 2] * c * c
+        along += 2.0 * (h[0, 1] * a * b + h[0, 2] * a * c + h[1, 2] * b * c)
+        if not along > 0:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _stationary(h, g, step):
+    """Solve H step = g by cofactors; False where H is singular."""
+    c0 = h[1, 1] * h[2, 2] - h[1, 2] * h[1, 2]
+    c1 = h[0, 2] * h[1, 2] - h[0, 1] * h[2, 2]
+    c2 = h[0, 1] * h[1, 2] - h[0, 2] * h[1, 1]
+    determinant = h[0, 0] * c0 + h[0, 1] * c1 + h[0, 2] * c2
+    if determinant == 0:
+        return False
+    c11 = h[0, 0] * h[2, 2] - h[0, 2] * h[0, 2]
+    c12 = h[0, 1] * h[0, 2] - h[0, 0] * h[1, 2]
+    c22 = h[0, 0] * h[1, 1] - h[0, 1] * h[0, 1]
+    step[0] = (c0 * g[0] + c1 * g[1] + c2 * g[2]) / determinant
+    step[1] = (c1 * g[0] + c11 * g[1] + c12 * g[2]) / determinant
+    step[2] = (c2 * g[0] + c12 * g[1] + c22 * g[2]) / determinant
+    return True
 
 
 @njit(cache=True, nogil=True)

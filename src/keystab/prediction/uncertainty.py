@@ -206,20 +206,21 @@ def _error_bars(
         level += slope * local_image(image, scale, y, x, camera_blur)
     level = np.sqrt(np.maximum(level, 0.0))
     covariance = noise_jets(scale, camera_blur, kappa) * level[:, None, None] ** 2
+    n_spo, delta_min, sigma_min, refined = sampling
+    octave = keypoints["octave"].to_numpy(dtype=np.int64)
+    grid = np.column_stack(
+        [np.full(sigma.size, np.log(2) / n_spo), delta_min * 2.0**octave / sigma]
+    )
     survival = np.empty(len(keypoints))
     moments = np.empty((len(keypoints), 3, 3))
     quiet = (level == 0) | noise_free
     for rows, known in ((quiet, True), (~quiet, False)):
         if not rows.any():
             continue
-        if known:
-            outcome = after_noise(jets[rows], sign[rows], covariance[rows])
-        else:
-            outcome = among_scenes(jets[rows], sign[rows], covariance[rows], level[rows], kappa)
+        seen = jets[rows], sign[rows], covariance[rows], grid[rows]
+        outcome = after_noise(*seen) if known else among_scenes(*seen, level[rows], kappa)
         survival[rows] = outcome.survival
         moments[rows] = outcome.moments * (1.0 if known else 0.5)
-    n_spo, delta_min, sigma_min, refined = sampling
-    octave = keypoints["octave"].to_numpy(dtype=np.int64)
     own = detector_error(octave, n_spo, delta_min, sigma_min, refined)
     return {
         "std_y": np.sqrt(sigma**2 * moments[:, 1, 1] + own.location**2),
