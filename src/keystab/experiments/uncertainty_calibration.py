@@ -46,6 +46,7 @@ __all__ = [
     "returned",
     "separation_table",
     "shot",
+    "strata_table",
     "weighted_error",
 ]
 
@@ -55,7 +56,7 @@ LEVELS = (0.5, 0.9, 0.95, 0.99)
 METHODS = ("bars", "octave", "inverse_hessian")
 """The error bars, and what stands in for them today."""
 
-SHOTS = ("additive", "signal", "jpeg")
+SHOTS: tuple[Literal["additive", "signal", "jpeg"], ...] = ("additive", "signal", "jpeg")
 """Kinds of noise: independent of the signal; a third of its variance at mid-grey so and the rest in
 proportion to the grey value; additive, then 8 bits and JPEG of quality 90."""
 
@@ -308,8 +309,8 @@ def reliability_table(
     Returns
     -------
     DataFrame
-        The columns of `by`, ``bin``, ``n``, mean ``predicted``, share ``found`` and its Wilson
-        interval ``low, high``; bins without keypoints are left out.
+        The columns of `by`, ``bin``, ``n``, mean ``predicted_survival``, share ``found`` and its
+        Wilson interval ``low, high``; bins without keypoints are left out.
     """
     rows = []
     for key, part in _groups(table, by):
@@ -317,7 +318,12 @@ def reliability_table(
         for place, inside in part.groupby(number):
             low, high = wilson_interval(int(inside["found"].sum()), len(inside))
             rows.append(
-                {**key, "bin": place, "n": len(inside), "predicted": inside["survival"].mean()}
+                {
+                    **key,
+                    "bin": place,
+                    "n": len(inside),
+                    "predicted_survival": inside["survival"].mean(),
+                }
                 | {"found": inside["found"].mean(), "low": float(low), "high": float(high)}
             )
     return pd.DataFrame(rows)
@@ -328,10 +334,11 @@ def weighted_error(reliability: pd.DataFrame) -> float:
 
     Examples
     --------
-    >>> weighted_error(pd.DataFrame({"n": [1, 3], "predicted": [0.1, 0.9], "found": [0.5, 0.9]}))
+    >>> bins = {"n": [1, 3], "predicted_survival": [0.1, 0.9], "found": [0.5, 0.9]}
+    >>> weighted_error(pd.DataFrame(bins))
     0.1
     """
-    away = (reliability["found"] - reliability["predicted"]).abs()
+    away = (reliability["found"] - reliability["predicted_survival"]).abs()
     return float((away * reliability["n"]).sum() / reliability["n"].sum())
 
 
@@ -358,3 +365,37 @@ def _groups(table: pd.DataFrame, by: Sequence[str]) -> list[tuple[dict[str, obje
     return [
         (dict(zip(by, key, strict=True)), part) for key, part in table.groupby(list(by), sort=True)
     ]
+
+
+#: What the error bars are judged by besides noise: columns cut into quarters, or as they are.
+_STRATA = ("octave", "sigma", "conditioning", "contrast")
+
+
+def strata_table(table: pd.DataFrame, methods: Sequence[str] = METHODS) -> pd.DataFrame:
+    """Coverage in parts of the keypoints that differ in octave, scale, conditioning or contrast.
+
+    Parameters
+    ----------
+    table, methods
+        See `coverage_table`.
+
+    Returns
+    -------
+    DataFrame
+        Columns of `coverage_table` and ``stratum``, what parts differ in; ``part``, 0 for the
+        quarter with the smallest values, or the octave; ``middle``, the median value in it.
+    """
+    found = table[table["found"]]
+    parts = []
+    for name in _STRATA:
+        values = found[name]
+        if name == "octave":
+            part = values.astype(int)
+        else:
+            part = pd.Series(
+                np.searchsorted(values.quantile([0.25, 0.5, 0.75]), values), index=found.index
+            )
+        middle = values.groupby(part).median()
+        held = coverage_table(found.assign(part=part), ["part"], methods)
+        parts.append(held.assign(stratum=name, middle=held["part"].map(middle)))
+    return pd.concat(parts, ignore_index=True)
