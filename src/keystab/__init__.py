@@ -25,6 +25,7 @@ _HOME = {
     "InputError": "errors",
     "balanced_delta": "scalespace.sampling",
     "detect_keypoints": "detection.detector",
+    "edge_blur": "camera.edge_blur",
     "fit_psf": "camera.psf_fit",
     "keypoint_uncertainty": "prediction.uncertainty",
     "occurrence": "matching.unique_keypoints",

@@ -22,6 +22,7 @@ from keystab.prediction.survival import after_noise, among_scenes
 from keystab.scalespace.dog import checked_image
 from keystab.scalespace.sampling import balanced_delta
 from keystab.utils import validation
+from keystab.utils.progress import progress_if_watched
 
 __all__ = ["keypoint_uncertainty"]
 
@@ -44,7 +45,7 @@ def keypoint_uncertainty(
     max_iterations: float = 2,
     scale_moves: bool = True,
     move: str = "nearest",
-    n_oct: int = 1,
+    n_oct: int | str = 1,
     threads: int = 1,
     noise_free: bool = False,
 ) -> pd.DataFrame:
@@ -145,7 +146,8 @@ def keypoint_uncertainty(
     )
     columns: dict[str, NDArray[np.float64]] = {name: np.empty(len(keypoints)) for name in _COLUMNS}
     sampling = (n_spo, delta_min or balanced_delta(n_spo, kappa, sigma_min), sigma_min, refine)
-    for start in range(0, len(keypoints), _BATCH):
+    batches = range(0, len(keypoints), _BATCH)
+    for start in progress_if_watched(batches, len(batches), "error bars"):
         rows = slice(start, start + _BATCH)
         part = _error_bars(
             array, keypoints.iloc[rows], camera_blur, kappa, (offset, slope), sampling, noise_free

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from keystab.errors import InputError
 from keystab.provenance import table_differences
-from keystab.provenance.column_relations import broken_relations
 from keystab.provenance.foreign_tables import read_foreign_table
 from keystab.provenance.lineage import code_of_figure, file_digest, read_figure_metadata
 from keystab.provenance.run_description import (
@@ -29,6 +28,7 @@ from keystab.provenance.run_description import (
     read_about,
 )
 from keystab.provenance.snakemake_records import Record
+from keystab.study.column_relations import broken_relations
 
 if TYPE_CHECKING:
     import pandas as pd
