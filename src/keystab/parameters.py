@@ -229,6 +229,19 @@ class ComparedWithTruth(Compared):
 
 
 @dataclass(frozen=True)
+class ShotPairs:
+    """Pairs of shots against which error bars are held (figure uncertainty)."""
+
+    noise: Annotated[list[float], Setting("uncertainty.noise", "standard deviations of the noise")]
+    n_pairs: Annotated[int, Setting("uncertainty.n_pairs", "pairs of the first view")]
+    n_pairs_others: Annotated[
+        int, Setting("uncertainty.n_pairs_others", "pairs of other views and kinds of noise")
+    ]
+    n_spo: Annotated[int, Setting("uncertainty.n_spo", "scales per octave")]
+    n_oct: Annotated[int, Setting("uncertainty.n_oct", "octaves")]
+
+
+@dataclass(frozen=True)
 class Stable:
     """Which keypoints are stable and which are unstable (section 5.3)."""
 

@@ -62,6 +62,7 @@ def test_a_terminal_gets_a_bar_that_disappears(monkeypatch):
 
     terminal = Terminal()
     monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setattr("keystab.utils.progress.DELAY", 0.0)
     assert list(progress("abc", 3, "letters")) == ["a", "b", "c"]
     assert "letters" in terminal.getvalue()
     assert terminal.getvalue().endswith("\r")

@@ -26,14 +26,14 @@ ROOMS = {
     "detection": "root utils scalespace io",
     "evaluation": "root utils matching",  # knows no detector, and so can audit any
     "truth": "root utils scalespace camera detection",
-    "prediction": "root scalespace",
+    "prediction": "root utils scalespace detection",
     "experiments": "root utils scalespace camera matching detection evaluation prediction",
     "study": "root utils scalespace camera io matching evaluation",
-    "provenance": "root utils io evaluation study",
+    "provenance": "root utils io study",
     "stages": "root utils scalespace camera io matching detection evaluation truth experiments study "
     "provenance",
     "figures": "root utils io",  # tables, and no science
-    "cli": "root utils camera io detection truth provenance",
+    "cli": "root utils camera io detection truth prediction provenance figures",
 }
 ALLOWED = {(room, other) for room, others in ROOMS.items() for other in others.split()}
 MOST_ARROWS = 70

@@ -1,7 +1,7 @@
-"""What a detector should find, and what it finds of it (figures truth and refinement).
+"""What a detector should find, and what it finds of it (figures truth, refinement, uncertainty).
 
 Comes in: views, tables of extrema and refinement traces. Goes out: truth/*.parquet, the true extrema
-of the view and of the scene, and tables/truth_*.csv, refinement_choices.csv. Steps: climb from the
+of the view and of the scene, and tables/truth_*.csv, refinement_choices.csv, uncertainty_*.csv. Steps: climb from the
 discrete extrema of several samplings to the extrema of the continuous scale-space, by Newton's
 method on the full sums; evaluate detections against them: recall, precision, errors.
 """
@@ -259,5 +259,34 @@ rule evaluate_refinement:
         ),
     message:
         "Holding ways to refine against the true extrema{params.scene}"
+    shell:
+        "{params.command} >{log:q} 2>&1"
+
+
+rule calibrate_bars:
+    """Figure uncertainty: what the error bars of keypoints hold, and what survival says."""
+    input:
+        views=ancient(f"{HERE}views/shots"),
+        views_digest=f"{HERE}views/shots.sha256",
+    output:
+        coverage=f"{HERE}tables/uncertainty_coverage.csv",
+        strata=f"{HERE}tables/uncertainty_strata.csv",
+        reliability=f"{HERE}tables/uncertainty_reliability.csv",
+        separation=f"{HERE}tables/uncertainty_separation.csv",
+    log:
+        f"{LOG}calibrate_bars.log",
+    benchmark:
+        f"{BENCHMARK}calibrate_bars.tsv"
+    resources:
+        runtime=growing(job_resources.minutes_of_shots),
+    params:
+        **stage(
+            "calibrate_bars",
+            parameters.Scales,
+            parameters.Compared,
+            parameters.ShotPairs,
+        ),
+    message:
+        "Holding error bars against second shots, noise = {params.noise}{params.scene}"
     shell:
         "{params.command} >{log:q} 2>&1"

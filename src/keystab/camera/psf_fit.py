@@ -28,6 +28,12 @@ sample beside the centre is then below 0.4 % of the maximum."""
 _BUMP = 0.5
 """Share of the maximum above which samples are taken for the bump when the fit begins."""
 
+_MOST_SAMPLES = 10**6
+"""Samples of a picture whose fit ends within a minute."""
+
+_MOST_BUMPS = 10
+"""Separate bright areas in a picture of a point spread function; a photograph has hundreds."""
+
 
 @dataclass(frozen=True)
 class PsfFit:
@@ -103,7 +109,14 @@ def fit_psf(psf: ArrayLike, oversampling: float = 1.0, background: float = 0.0) 
     """
     validation.number("oversampling", oversampling, above=0)
     light = _picture(psf) - validation.number("background", background)
+    if light.size > _MOST_SAMPLES:
+        raise InputError(
+            f"the picture has {light.shape[0]} x {light.shape[1]} samples, allowed are "
+            f"{_MOST_SAMPLES:.0e} in all: crop it to the point spread function; of a photograph, "
+            "keystab.edge_blur or --camera-blur auto tells the blur from edges"
+        )
     y, x, width = _start(light)
+    _require_bump(light)
     scale = float(light.max())
     light = light / scale
     isotropic, residual = _least_squares(light, np.array([1.0, y, x, math.log(width)]))
@@ -187,6 +200,19 @@ def _start(light: NDArray[np.float64]) -> tuple[float, float, float]:
     weights = light[rows[near], columns[near]]
     y, x = (float((weights * place[near]).sum() / weights.sum()) for place in (rows, columns))
     return y, x, max(width, 0.5)
+
+
+def _require_bump(light: NDArray[np.float64]) -> None:
+    """Refuse what is no point spread function, such as a photograph: its bright samples scatter."""
+    from scipy.ndimage import label
+
+    n_bumps = label(light >= _BUMP * light.max())[1]
+    if n_bumps > _MOST_BUMPS:
+        raise InputError(
+            f"the picture is no point spread function: {n_bumps} separate areas lie above half of "
+            f"its maximum, allowed are {_MOST_BUMPS}; crop it to one bump; of a photograph, "
+            "--camera-blur auto of keystab detect tells the blur from edges"
+        )
 
 
 def _least_squares(

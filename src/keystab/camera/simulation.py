@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def simulate_view(
     reference: Scene | ArrayLike,
     blur: float,
     step: float,
-    shape: tuple[int, int],
+    shape: tuple[int, int] | None = None,
     shift: tuple[float, float] = (0.0, 0.0),
     rotation: float = 0.0,
     noise: float = 0.0,
@@ -96,7 +97,10 @@ def simulate_view(
     ----------
     reference : Scene or array_like, shape (H, W)
         The scene. A `Scene` saves computing the series for every view.
-    blur, step, shape, shift, rotation, noise, seed
+    shape : (int, int), optional
+        Height and width of the view; by default as many pixels as see all of the reference,
+        ``int(size / step)``.
+    blur, step, shift, rotation, noise, seed
         See `ViewSpec`.
 
     Returns
@@ -122,7 +126,34 @@ def simulate_view(
     >>> simulate_view(ramp, blur=0.0, step=2.0, shape=(1, 3), shift=(0.0, 0.25)).round(3)
     array([[2., 4., 6.]])
     """
-    return simulate(reference, ViewSpec(blur, step, shape, shift, rotation, noise, seed))
+    # Other values are refused before the series of the reference is made.
+    spec = ViewSpec(blur, step, (1, 1) if shape is None else shape, shift, rotation, noise, seed)
+    if shape is None:
+        scene = reference if isinstance(reference, Scene) else Scene(reference)
+        return simulate(scene, replace(spec, shape=whole_shape(scene.shape, step)))
+    return simulate(reference, spec)
+
+
+def whole_shape(shape: tuple[int, int], step: float) -> tuple[int, int]:
+    """Height and width of a view that sees all of a reference.
+
+    Raises
+    ------
+    InputError
+        If a pixel of the view is larger than the reference.
+
+    Examples
+    --------
+    >>> whole_shape((2250, 4000), 10)
+    (225, 400)
+    """
+    height, width = (int(n / step) for n in shape)
+    if height < 1 or width < 1:
+        raise InputError(
+            f"step is {step:g}, more than a side of the picture of {shape[0]} x {shape[1]} pixels; "
+            "give a smaller step or a shape"
+        )
+    return height, width
 
 
 def simulate(reference: Scene | ArrayLike, spec: ViewSpec) -> NDArray[np.float64]:

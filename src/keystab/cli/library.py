@@ -1,9 +1,8 @@
-"""Commands on pictures and files: simulate, detect, blur, truth, inspect."""
+"""Commands on pictures and files: simulate, detect, uncertainty, truth, blur, inspect."""
 
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import math
 import sys
 import time
@@ -14,12 +13,15 @@ from typing import TYPE_CHECKING
 from keystab.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
 
 
 def simulate(args: argparse.Namespace) -> None:
     """Take a view of a picture with the simulated camera and write it."""
-    from keystab.camera.simulation import Scene
+    import dataclasses
+
+    from keystab.camera.simulation import Scene, whole_shape
     from keystab.camera.simulation import simulate as take
     from keystab.camera.views import ViewSpec
     from keystab.io.pictures import FORMATS, read_picture, write_picture
@@ -41,13 +43,7 @@ def simulate(args: argparse.Namespace) -> None:
     )
     scene = Scene(read_picture(args.picture))
     if args.shape is None:
-        height, width = (int(n / args.step) for n in scene.shape)
-        if height < 1 or width < 1:
-            raise InputError(
-                f"step is {args.step:g}, more than a side of the picture of {scene.shape[0]} x "
-                f"{scene.shape[1]} pixels; give a smaller step or a shape"
-            )
-        spec = dataclasses.replace(spec, shape=(height, width))
+        spec = dataclasses.replace(spec, shape=whole_shape(scene.shape, args.step))
     view = take(scene, spec)
     write_picture(view, args.out)
     outside = int(((view < 0) | (view > 1)).sum())
@@ -64,6 +60,20 @@ def detect(args: argparse.Namespace) -> None:
     from keystab.detection.detector import detect_keypoints
 
     _tabulate(args, detect_keypoints, ("keypoint", "keypoints"))
+
+
+def uncertainty(args: argparse.Namespace) -> None:
+    """Detect keypoints, with error bars and the chance that each is found again."""
+    from keystab.prediction.uncertainty import keypoint_uncertainty
+
+    _tabulate(args, keypoint_uncertainty, ("keypoint", "keypoints"))
+
+
+def truth(args: argparse.Namespace) -> None:
+    """Find the true extrema of a picture and write them as a table."""
+    from keystab.truth.true_extrema import true_extrema
+
+    _tabulate(args, true_extrema, ("extremum", "extrema"))
 
 
 def blur(args: argparse.Namespace) -> None:
@@ -88,48 +98,125 @@ def blur(args: argparse.Namespace) -> None:
     )
 
 
-def truth(args: argparse.Namespace) -> None:
-    """Find the true extrema of a picture and write them as a table."""
-    from keystab.truth.true_extrema import true_extrema
-
-    _tabulate(args, true_extrema, ("extremum", "extrema"))
-
-
 def _tabulate(
     args: argparse.Namespace, find: Callable[..., pd.DataFrame], nouns: tuple[str, str]
 ) -> None:
     """Write what a function finds in a picture; say how many they are and how long it took."""
     from keystab.io.pictures import read_picture
     from keystab.io.tables import to_csv, write_table
+    from keystab.utils.progress import watched
 
-    _check_table(args.output)
+    _check_outputs(args)
     image = read_picture(args.picture)
     options = {name: getattr(args, name) for name in args.parameters}
+    if options["camera_blur"] == "auto":
+        options["camera_blur"] = _blur_of_edges(args, image)
+    _warn_of_coarse_sampling(args)
     start = time.monotonic()
-    found = find(image, **options)
+    with watched():
+        found = find(image, **options)
     seconds = time.monotonic() - start
-    if args.output is None:
-        sys.stdout.write(to_csv(found))
-    else:
+    if args.output is not None:
         write_table(found, args.output)
+    elif args.draw is None and not sys.stdout.isatty():
+        sys.stdout.write(to_csv(found))
     noun = nouns[len(found) != 1]
-    print(f"{args.picture}: {len(found)} {noun} in {seconds:.1f} s", file=sys.stderr)
+    octaves = f" in {_octaves(options['n_oct'])}" if "n_oct" in options else ""
+    print(f"{args.picture}: {len(found)} {noun}{octaves}, {seconds:.1f} s", file=sys.stderr)
+    if args.draw is not None or args.output is not None or sys.stdout.isatty():
+        print(_summary(args, found))
+    if args.draw is not None:
+        from keystab.figures.overlay import draw_keypoints
+
+        said = draw_keypoints(image, found, args.draw, args.colour, args.part, args.enlarge)
+        print(f"{args.draw}: {said}", file=sys.stderr)
+
+
+def _octaves(n_oct: int | str) -> str:
+    if n_oct == "all":
+        return "all octaves"
+    return "1 octave (--n-oct all for more)" if n_oct == 1 else f"{n_oct} octaves"
+
+
+def _summary(args: argparse.Namespace, found: pd.DataFrame) -> str:
+    """What a person wants to know of a table before its rows."""
+    lines = []
+    if len(found):
+        maxima = int((found["sign"] > 0).sum())
+        lines += [
+            f"maxima, minima   {maxima}, {len(found) - maxima}",
+            f"sigma            {found['sigma'].min():.3g} to {found['sigma'].max():.3g} px, "
+            f"half of them below {found['sigma'].median():.3g}",
+        ]
+    if len(found) and "survival" in found:
+        off = found[["std_y", "std_x"]].max(axis=1)
+        lines += [
+            f"position         half have a standard deviation below {off.median():.2g} px, nine "
+            f"tenths below {off.quantile(0.9):.2g}",
+            f"scale            half below {math.expm1(found['std_log_sigma'].median()):.1%}",
+            f"survival         {(found['survival'] > 0.9).mean():.0%} above 0.9, "
+            f"{(found['survival'] < 0.5).mean():.0%} below 0.5",
+            f"noise            {found['noise'].median():.3g}, "
+            + ("estimated from the picture" if args.noise is None else "as given"),
+        ]
+    if args.output is None and args.draw is None:
+        lines.append("-o TABLE.csv writes the rows, --draw FILE.png draws them")
+    return "\n".join(lines)
+
+
+def _blur_of_edges(args: argparse.Namespace, image: np.ndarray) -> float:
+    """Camera blur from the picture's edges; says what was found and what a wrong one does."""
+    from keystab.camera.edge_blur import edge_blur
+
+    try:
+        found = edge_blur(image)
+    except InputError as error:
+        raise InputError(f"{args.picture}: {error}") from None
+    # An extremum at sigma of a picture of blur c lies at the same sigma^2 - c^2, whatever c is.
+    off = math.sqrt(args.sigma_min**2 + found.high**2 - found.blur**2) / args.sigma_min - 1
+    print(
+        f"{args.picture}: camera blur {found.blur:.2f} px ({found.low:.2f} to {found.high:.2f}), "
+        f"from {found.n_edges} pixels on edges; if it were {found.high:.2f}, scales near "
+        f"{args.sigma_min:g} px would be {off:.0%} larger (figure S2 shows what a wrong blur does)",
+        file=sys.stderr,
+    )
+    if found.blur > args.sigma_min:
+        raise InputError(
+            f"{args.picture}: its blur of {found.blur:.2f} px is above sigma_min, "
+            f"{args.sigma_min:g}: give --sigma-min {math.ceil(10 * found.blur) / 10:g}"
+        )
+    return found.blur
+
+
+def _warn_of_coarse_sampling(args: argparse.Namespace) -> None:
+    """Say where samples lie too far apart to see the first scale."""
+    step = getattr(args, "delta_min", None)
+    if step is not None and math.isfinite(step) and step > args.sigma_min > 0:
+        print(
+            f"warning: samples {step:g} px apart do not resolve a blur of {args.sigma_min:g} px: "
+            "most of what is found will be chance; give a smaller --delta-min",
+            file=sys.stderr,
+        )
 
 
 def inspect(args: argparse.Namespace) -> None:
-    """Say in words what a store or a table holds."""
+    """Say in words what a picture, a store or a table holds."""
     from keystab.io.describe import describe
 
     print(describe(args.path))
 
 
-def _check_table(path: Path | None) -> None:
-    """Refuse a table that cannot be written before anything is computed."""
+def _check_outputs(args: argparse.Namespace) -> None:
+    """Refuse what cannot be written, or drawn, before anything is computed."""
     from keystab.io.tables import FORMATS
     from keystab.utils.files import check_writable
 
-    if path is not None:
-        check_writable(path, FORMATS)
+    if args.output is not None:
+        check_writable(args.output, FORMATS)
+    if args.draw is not None:
+        check_writable(args.draw, (".png", ".svg"))
+    elif args.part is not None or args.colour is not None or args.enlarge is not None:
+        raise InputError("--part, --colour and --enlarge are about a drawing: give --draw FILE.png")
 
 
 def _is_png(path: Path) -> bool:

@@ -7,10 +7,10 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from keystab._version import __version__
-from keystab.cli.library import blur, detect, inspect, simulate, truth
+from keystab.cli.library import blur, detect, inspect, simulate, truth, uncertainty
 from keystab.cli.study import archive, reference, verify, whence
 
 BAD_INPUT = 2
@@ -50,6 +50,15 @@ def build_parser() -> argparse.ArgumentParser:
             formatter_class=argparse.ArgumentDefaultsHelpFormatter,
         )
     )
+    _uncertainty_arguments(
+        commands.add_parser(
+            "uncertainty",
+            help="detect keypoints, with error bars and the chance that each is found again",
+            description="Detect the keypoints of a photograph, and say of each how far off it is "
+            "and how likely a second shot of the same scene has it again.",
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        )
+    )
     _blur_arguments(
         commands.add_parser(
             "blur",
@@ -70,11 +79,13 @@ def build_parser() -> argparse.ArgumentParser:
     )
     to = commands.add_parser(
         "inspect",
-        help="say what a store or a table holds",
-        description="Say in words what a stored scale-space, a stored set of views or a table of "
-        "keypoints holds.",
+        help="say what a picture, a store or a table holds",
+        description="Say in words what a picture, a stored scale-space, a stored set of views or a "
+        "table of keypoints holds.",
     )
-    to.add_argument("path", metavar="PATH", type=Path, help="store, .csv or .parquet table")
+    to.add_argument(
+        "path", metavar="PATH", type=Path, help="picture, store, .csv or .parquet table"
+    )
     to.set_defaults(run=inspect)
     _study_commands(commands.add_parser)
     return parser
@@ -174,17 +185,80 @@ def _simulate_arguments(to: argparse.ArgumentParser) -> None:
 
 def _detect_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=detect)
+    flags = _search_flags(to, n_spo=3, n_oct=1)
+    to.set_defaults(parameters=[flag.dest for flag in flags])
+
+
+def _uncertainty_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=uncertainty)
+    flags = _search_flags(to, n_spo=15, n_oct="all")
+    flags.append(
+        to.add_argument(
+            "--noise", type=float, nargs="+", action=_Noise, metavar="SD",
+            help="noise of a pixel, its standard deviation in units of the range [0, 1]; or two "
+            "numbers, A B, for a variance of A + B times the grey value; estimated from the "
+            "picture if not given",
+        )
+    )  # fmt: skip
+    to.set_defaults(parameters=[flag.dest for flag in flags])
+
+
+class _Noise(argparse.Action):
+    """One number, or two."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        if len(values) > 2:
+            parser.error(f"argument {option_string}: {len(values)} numbers; give one or two")
+        setattr(namespace, self.dest, values[0] if len(values) == 1 else tuple(values))
+
+
+def _table_arguments(to: argparse.ArgumentParser) -> argparse.Action:
+    """Add picture, table, drawing and camera blur; returns the last."""
     to.add_argument("picture", metavar="PICTURE", type=Path, help=_PICTURE)
     to.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=argparse.SUPPRESS,
-        help="table to write, .csv or .parquet; standard output if not given",
+        help="table to write, .csv or .parquet; if not given, a terminal gets a summary, and a "
+        "pipe the table as CSV",
     )  # fmt: skip
-    flags = [
-        to.add_argument(
-            "--camera-blur", type=float, required=True, metavar="C", default=argparse.SUPPRESS,
-            help="Gaussian blur that the picture already has, pixels",
-        ),
-        to.add_argument("--n-spo", type=int, default=3, metavar="N", help="scales per octave"),
+    drawing = to.add_argument_group("drawing")
+    drawing.add_argument(
+        "--draw", metavar="FILE", type=Path, default=argparse.SUPPRESS,
+        help="draw the keypoints on the picture, .png or .svg: circles of radius sigma, 95 %% "
+        "ellipses where there are error bars",
+    )  # fmt: skip
+    drawing.add_argument(
+        "--colour", choices=("survival", "sign", "conditioning"), default=argparse.SUPPRESS,
+        help="what colours tell; the first of these that is known if not given",
+    )  # fmt: skip
+    drawing.add_argument(
+        "--part", type=int, nargs=4, metavar=("Y", "X", "H", "W"), default=argparse.SUPPRESS,
+        help="draw a part: first row, first column, height and width in pixels",
+    )  # fmt: skip
+    drawing.add_argument(
+        "--enlarge", type=float, metavar="F", default=argparse.SUPPRESS,
+        help="enlarge ellipses so many times; if not given, so that half of them fit their circles",
+    )  # fmt: skip
+    to.set_defaults(output=None, draw=None, colour=None, part=None, enlarge=None)
+    return to.add_argument(
+        "--camera-blur", type=_blur, required=True, metavar="C", default=argparse.SUPPRESS,
+        help="Gaussian blur that the picture already has, pixels: 0.5 to 1 for an ordinary camera "
+        "at full resolution; auto estimates it from edges",
+    )  # fmt: skip
+
+
+def _search_flags(
+    to: argparse.ArgumentParser, n_spo: int, n_oct: int | str
+) -> list[argparse.Action]:
+    """Add the parameters of a detection; returns them."""
+    return [
+        _table_arguments(to),
+        to.add_argument("--n-spo", type=int, default=n_spo, metavar="N", help="scales per octave"),
         to.add_argument(
             "--delta-min", type=float, metavar="D",
             help="distance of fine samples, pixels; balanced with the scales if not given",
@@ -222,10 +296,12 @@ def _detect_arguments(to: argparse.ArgumentParser) -> None:
             "--move", choices=("nearest", "unit_step"), default="nearest",
             help="where a further model is made",
         ),
-        to.add_argument("--n-oct", type=int, default=1, metavar="N", help="octaves"),
+        to.add_argument(
+            "--n-oct", type=_n_oct, default=n_oct, metavar="N",
+            help="octaves; all for those up to a quarter of the picture's shorter side",
+        ),
         to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
     ]  # fmt: skip
-    to.set_defaults(parameters=[flag.dest for flag in flags], output=None)
 
 
 def _blur_arguments(to: argparse.ArgumentParser) -> None:
@@ -256,16 +332,8 @@ def _background(text: str) -> float | str:
 
 def _truth_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=truth)
-    to.add_argument("picture", metavar="PICTURE", type=Path, help=_PICTURE)
-    to.add_argument(
-        "-o", "--output", metavar="OUT", type=Path, default=argparse.SUPPRESS,
-        help="table to write, .csv or .parquet; standard output if not given",
-    )  # fmt: skip
     flags = [
-        to.add_argument(
-            "--camera-blur", type=float, required=True, metavar="C", default=argparse.SUPPRESS,
-            help="Gaussian blur that the picture already has, pixels",
-        ),
+        _table_arguments(to),
         to.add_argument("--sigma-min", type=float, default=1.1, metavar="S", help="first scale"),
         to.add_argument("--sigma-max", type=float, default=2.2, metavar="S", help="last scale"),
         to.add_argument(
@@ -278,7 +346,27 @@ def _truth_arguments(to: argparse.ArgumentParser) -> None:
         ),
         to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
     ]  # fmt: skip
-    to.set_defaults(parameters=[flag.dest for flag in flags], output=None)
+    to.set_defaults(parameters=[flag.dest for flag in flags])
+
+
+def _blur(text: str) -> float | str:
+    if text == "auto":
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no blur; give a number or auto") from None
+
+
+def _n_oct(text: str) -> int | str:
+    if text == "all":
+        return text
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no number of octaves; give a whole number or all"
+        ) from None
 
 
 def _count(text: str) -> float:

@@ -20,7 +20,7 @@ from keystab.detection.refinement import (
     trace,
 )
 from keystab.errors import InputError
-from keystab.scalespace.dog import ScaleSpace, scale_space
+from keystab.scalespace.dog import ScaleSpace, checked_image, scale_space
 from keystab.utils import validation
 
 
@@ -38,7 +38,7 @@ def detect_keypoints(
     max_iterations: float = 2,
     scale_moves: bool = True,
     move: str = "nearest",
-    n_oct: int = 1,
+    n_oct: int | str = 1,
     threads: int = 1,
 ) -> pd.DataFrame:
     """Detect the keypoints of an image, without any filter of contrast or edges.
@@ -75,8 +75,9 @@ def detect_keypoints(
         Whether a further model may be made at another scale index.
     move : {"nearest", "unit_step"}
         Where a further model is made, see `keystab.detection.refinement.trace`.
-    n_oct : int
-        Octaves; scales and sampling step double with each.
+    n_oct : int or "all"
+        Octaves; scales and sampling step double with each. All are those up to a quarter of the
+        picture's shorter side.
     threads : int
         Threads of the search. The result does not depend on it.
 
@@ -122,7 +123,7 @@ def detect_keypoints(
     >>> found.loc[found["value"].idxmin(), ["y", "x", "sigma"]].round(2).tolist()
     [20.0, 20.0, 1.78]
     """
-    validation.integer("n_oct", n_oct, least=1, most=40)
+    n_oct = number_of_octaves(n_oct, checked_image(image).shape, sigma_min)
     validation.count("max_iterations", max_iterations, least=1)
     validation.limit("max_offset", max_offset, above=0)
     validation.integer("n_spo", n_spo, least=1)
@@ -157,6 +158,24 @@ def detect_keypoints(
     names += ["models"] if refine else []
     kept = [table.loc[mask, names] for table, mask in zip(octaves, keep, strict=True)]
     return pd.concat(kept, ignore_index=True)
+
+
+def number_of_octaves(n_oct: int | str, shape: tuple[int, ...], sigma_min: float) -> int:
+    """Octaves that are asked for; all are those up to a quarter of the picture's shorter side.
+
+    Beyond, a scale sees more of the mirror images of a picture than of itself.
+
+    Examples
+    --------
+    >>> number_of_octaves("all", (225, 400), 1.1)
+    5
+    """
+    if n_oct == "all":
+        validation.number("sigma_min", sigma_min, above=0)
+        return max(1, int(math.log2(max(min(shape) / (4 * sigma_min), 1.0))))
+    if isinstance(n_oct, str):
+        raise InputError(f"n_oct is {n_oct!r}, allowed are whole numbers from 1 and 'all'")
+    return validation.integer("n_oct", n_oct, least=1, most=40)
 
 
 def extrema_table(

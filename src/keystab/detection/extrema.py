@@ -27,7 +27,7 @@ from keystab.errors import InputError
 from keystab.scalespace.axis import Block
 from keystab.scalespace.dog import ScaleSpace, ranges
 from keystab.utils import memory, validation
-from keystab.utils.progress import progress
+from keystab.utils.progress import progress, progress_if_watched
 
 # Blocks in which extrema are sought: flat ones, because the number of source rows that a block
 # needs grows with its height, and wide ones, because the products along x are shared by a whole
@@ -110,7 +110,8 @@ def extrema_and_cubes(
     _require_an_end(space, threads, asked)
     tolerance = max(epsilon, space.rounding)
     space.source, space.axes, space.blurs  # noqa: B018  made once, before threads share them
-    what = f"extrema, n_spo {space.sampling.n_spo}" if show_progress else None
+    what = f"extrema, n_spo {space.sampling.n_spo}"
+    report = progress if show_progress else progress_if_watched
     found = [decided(space, np.empty((0, 4), dtype=np.int64), tolerance)]
     with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
         for find, columns in _searches(space, tolerance, pool, threads, asked):
@@ -118,7 +119,7 @@ def extrema_and_cubes(
             # Decided once all columns are given out: short tasks for threads that have none left.
             tasks = [
                 pool.submit(decided, space, some, tolerance)
-                for some in (progress(candidates, len(columns), what) if what else candidates)
+                for some in report(candidates, len(columns), what)
             ]
             found += [task.result() for task in tasks]
     extrema, cubes = (np.concatenate(parts) for parts in zip(*found, strict=True))

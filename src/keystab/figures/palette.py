@@ -43,6 +43,9 @@ _OFFSETS = ("#04121f", "#00437a", "#0072B2", "#5AAEE0")
 SIFT_COLOURS = {"unfiltered": "#A8458A", "filtered": "#5b1f57"}
 """SIFT with its own refinement, without and with its filters of contrast and edges (figure 7)."""
 
+SIGN_COLOURS = {"maximum": "#F0A000", "minimum": "#3DA5E0"}
+"""Maxima and minima of the difference of Gaussians, on a photograph."""
+
 METHOD_COLOURS = {"sampled": "#D55E00", "dct": "#0072B2", "discrete_analogue": "#009E73"}
 """Ways to blur (figure 1)."""
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from keystab.errors import InputError
 from keystab.io.checksums import verify
+from keystab.io.pictures import read_picture
 from keystab.io.scale_space_store import open_scale_space
-from keystab.io.tables import read_table
+from keystab.io.tables import FORMATS, read_table
 from keystab.io.view_store import open_views
 from keystab.io.zarr_groups import attributes_of
 from keystab.utils.memory import in_words
@@ -19,18 +20,18 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["describe"]
+__all__ = ["describe", "table_in_words"]
 
 
 def describe(path: str | os.PathLike[str]) -> str:
-    """Say what a stored scale-space, a stored set of views or a table of keypoints holds.
+    """Say what a picture, a stored scale-space, a set of views or a table of keypoints holds.
 
     Where a store has checksums beside it (`keystab.io.checksums`), all its files are checked.
 
     Parameters
     ----------
     path : path
-        Folder of a store, or a .csv or .parquet file.
+        A picture, the folder of a store, or a .csv or .parquet file.
 
     Returns
     -------
@@ -44,9 +45,11 @@ def describe(path: str | os.PathLike[str]) -> str:
     """
     path = Path(path)
     if not path.exists():
-        raise InputError(f"{path}: no such file or folder; give a store or a table")
+        raise InputError(f"{path}: no such file or folder; give a picture, a store or a table")
     if path.is_file():
-        return "\n".join(_table(read_table(path), path))
+        if path.suffix.lower() in FORMATS:
+            return table_in_words(read_table(path), str(path))
+        return _picture(path)
     checked = _checked(path)
     attributes = attributes_of(path)
     if attributes.get("kind") == "scale-space":
@@ -91,7 +94,33 @@ def _views(views: xr.Dataset, path: Path) -> list[str]:
     return lines
 
 
-def _table(table: pd.DataFrame, path: Path) -> list[str]:
+def _picture(path: Path) -> str:
+    picture = read_picture(path)
+    height, width = picture.shape
+    return "\n".join(
+        [
+            f"{path}: picture of {height} x {width} pixels, {height * width / 1e6:.3g} megapixels",
+            f"  grey values {picture.min():.6g} to {picture.max():.6g}, mean {picture.mean():.6g}",
+            f"  {_counted(int((picture >= 1).sum()), 'pixel')} at 1 or above, "
+            f"{int((picture <= 0).sum())} at 0 or below",
+        ]
+    )
+
+
+def table_in_words(table: pd.DataFrame, name: str) -> str:
+    """Say what a table holds: its rows, and the range of each of its columns.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> print(table_in_words(pd.DataFrame({"n_spo": [3, 15]}), "samplings"))
+    samplings: table of 2 rows
+      n_spo: 3 to 15
+    """
+    return "\n".join(_table(table, name))
+
+
+def _table(table: pd.DataFrame, path: str) -> list[str]:
     n = len(table)
     numeric = {name for name, column in table.items() if column.dtype.kind in "biuf" or not n}
     keypoints = {"y", "x", "sigma"} <= numeric

@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from keystab.errors import InputError
-from keystab.provenance.column_relations import broken_relations
 from keystab.provenance.foreign_tables import read_foreign_table
 from keystab.provenance.lineage import code_of_figure, file_digest, read_figure_metadata
 from keystab.provenance.run_description import LEFT_OUT, LEFT_OUT_COLUMNS, About
 from keystab.provenance.snakemake_records import Record
+from keystab.study.column_relations import broken_relations
 
 if TYPE_CHECKING:
     import pandas as pd

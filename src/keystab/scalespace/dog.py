@@ -8,6 +8,7 @@ octave holds, so that memory does not grow with the image nor with ``n_spo``.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
@@ -347,11 +348,22 @@ def _axis(
 
 def checked_image(image: np.ndarray) -> np.ndarray:
     """A finite two-dimensional float64 array, or an `InputError` that says what is wrong."""
+    if isinstance(image, (str, os.PathLike)):
+        raise InputError(
+            f"the image is the path {os.fspath(image)!r}: give its pixels, "
+            "keystab.read_picture(path)"
+        )
     array = np.asarray(unmasked("the image", image))
     if array.dtype == bool or not (
         np.issubdtype(array.dtype, np.integer) or np.issubdtype(array.dtype, np.floating)
     ):
         raise InputError(f"the image holds {array.dtype} values: give real numbers")
+    if array.ndim == 3 and array.shape[2] in (3, 4):
+        raise InputError(
+            f"the image has shape {array.shape}, which is colour: give one grey value per pixel, "
+            "(height, width), as keystab.read_picture does, or "
+            "image[..., :3] @ (0.299, 0.587, 0.114)"
+        )
     if array.ndim != 2 or array.size == 0:
         raise InputError(
             f"the image has shape {array.shape}: give one grey value per pixel, (height, width)"

@@ -78,6 +78,12 @@ Scores
     detections : table of scored detections
     gain : table of what models gain
 
+Error bars
+    coverage : table of the shares that ellipses hold
+    strata : the same in parts of the keypoints
+    reliability : table of what returns, against what was predicted
+    separation : table of how well guesses tell what returns
+
 Theory
     profiles : table of profiles of point spread functions
     camera_blur : camera blur, pixels

@@ -69,6 +69,17 @@ def minutes_of_truth(settings: Settings) -> int:
     return _minutes(300 * SECONDS * pixels(settings, "still")[0])
 
 
+def minutes_of_shots(settings: Settings) -> int:
+    """Time to detect keypoints and their error bars in pairs of shots."""
+    asked = settings["uncertainty"]
+    # Each pair takes three searches and some error bars; other kinds of noise come with the first
+    # view, other views without them.
+    pairs = asked["n_pairs"] + 4 * asked["n_pairs_others"]
+    scales = asked["n_spo"] * asked["n_oct"]
+    seconds = 5 * SECONDS * pixels(settings, "shots")[0] * scales
+    return _minutes(seconds * pairs * len(asked["noise"]))
+
+
 def megabytes_of_reference(settings: Settings) -> int:
     """Memory to work on the whole reference: some copies of it."""
     height, width = _shape(settings["reference"])

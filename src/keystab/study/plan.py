@@ -83,6 +83,15 @@ FIGURES = {
     ),
     # what refinement keeps and loses of the true extrema
     "refinement": Figure(("refinement_choices.csv",)),
+    # error bars of keypoints against second shots
+    "uncertainty": Figure(
+        (
+            "uncertainty_coverage.csv",
+            "uncertainty_strata.csv",
+            "uncertainty_reliability.csv",
+            "uncertainty_separation.csv",
+        )
+    ),
     # whether one detection shows that it is unstable
     "predictors": Figure(
         ("predictors_auc.csv", "predictors_gain.csv", "predictors_roc.csv"), of_scene=False

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from keystab.scalespace.continuous_dog import DogSeries, Jets
 from keystab.truth.seeds import Seeds
+from keystab.utils.progress import progress_if_watched
 
 __all__ = ["climb", "climbed", "folded", "newton_step"]
 
@@ -97,7 +98,7 @@ def climbed(
     jets = _jets(series, points, bounds is None)
     radius = np.full(sign.size, _FIRST_RADIUS)
     active = np.arange(sign.size)
-    for _ in range(_MOST_STEPS):
+    for _ in progress_if_watched(range(_MOST_STEPS), _MOST_STEPS, "steps of climbs, at most"):
         here = jets[active]
         model = here if bounds else _of_slice(here, sign[active], series.contrast)
         step, promised, at_end = _step(model, sign[active], radius[active])

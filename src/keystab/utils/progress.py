@@ -5,22 +5,53 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TypeVar
 
-__all__ = ["progress"]
+__all__ = ["progress", "progress_if_watched", "watched"]
 
 T = TypeVar("T")
 
 #: Seconds between lines in a log file. Jobs that take less write none.
 LOG_INTERVAL = 10.0
 
+#: Seconds before a terminal gets a bar.
+DELAY = 2.0
+
+_watched: ContextVar[bool] = ContextVar("watched", default=False)
+
+
+@contextmanager
+def watched() -> Iterator[None]:
+    """Let long computations of a block report their progress.
+
+    A library is silent, and a command is not: what a command calls asks `progress_if_watched`.
+    """
+    token = _watched.set(True)
+    try:
+        yield
+    finally:
+        _watched.reset(token)
+
+
+def progress_if_watched(iterable: Iterable[T], total: int, what: str) -> Iterable[T]:
+    """Report as `progress` does inside of `watched`, and nothing elsewhere.
+
+    Examples
+    --------
+    >>> list(progress_if_watched("abc", total=3, what="letters"))
+    ['a', 'b', 'c']
+    """
+    return progress(iterable, total, what) if _watched.get() else iterable
+
 
 def progress(iterable: Iterable[T], total: int, what: str) -> Iterator[T]:
     """Hand on the items of an iterable and report progress on standard error.
 
-    A terminal gets a bar that disappears when done. Anything else, such as the log file of a
-    workflow, gets a line of text at most every `LOG_INTERVAL` seconds, and a last one if there was
-    any.
+    A terminal gets a bar after two seconds that disappears when done. Anything else, such as the
+    log file of a workflow, gets a line of text at most every `LOG_INTERVAL` seconds, and a last one
+    if there was any.
 
     Parameters
     ----------
@@ -44,7 +75,7 @@ def progress(iterable: Iterable[T], total: int, what: str) -> Iterator[T]:
     if sys.stderr.isatty():
         from tqdm import tqdm
 
-        yield from tqdm(iterable, desc=what, total=total, leave=False)
+        yield from tqdm(iterable, desc=what, total=total, leave=False, delay=DELAY)
         return
     start = last = time.monotonic()
     done = 0

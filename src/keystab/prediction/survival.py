@@ -1,0 +1,328 @@
+r"""Whether an extremum comes back in a second shot of its scene, and how far off.
+
+What is seen of an extremum is its jet J (`keystab.prediction.noise_covariance`): derivatives of the
+scene's scale-space and of the noise. In a second shot the scene's part is the same and the noise is
+another. How much of J is scene is not known; it is inferred, because noise alone makes extrema too,
+and these do not come back.
+
+The scene's jet is a Gaussian of covariance z P, with P that of a spectrum :math:`|\omega|^{-2}`
+and an unknown local amplitude z, a *Gaussian scale mixture*; the noise's jet has the covariance C.
+Given z, that of the second shot is Gaussian,
+
+.. math:: J_2 \sim N(z P (z P + C)^{-1} J,\; z P (z P + C)^{-1} C + C),
+
+and by the Kac-Rice formula z has at an extremum the density :math:`p(z)\, N(J; 0, z P + C)` up to
+a factor, the gradient in J being 0. In coordinates in which P is the unit matrix and C diagonal all
+of that is one number per coordinate.
+
+From each of a fixed set of quasi-random draws of z and :math:`J_2`, the extremum of the cubic with
+these derivatives is climbed to. The share of draws whose extremum lies within `RADIUS` is the
+survival, and their second moments are the covariance of the shift.
+
+A detector looks at the 26 neighbours of a sample, so that it takes a saddle for an extremum where
+all of these lie on its steep sides: along a ridge askew to the grid. Therefore a stationary point
+counts as an extremum where the curvature has the sign along the 13 directions of the grid, and not
+along all.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from keystab.prediction.noise_covariance import ORDERS, scene_jets
+
+__all__ = ["RADIUS", "Outcome", "after_noise", "among_scenes"]
+
+RADIUS = 0.5
+"""How far a returning extremum is at most, in (ln sigma, y/sigma, x/sigma)."""
+
+#: Draws for each extremum. Their share is uncertain by 0.02 in the middle and less at the ends.
+_DRAWS = 256
+
+#: Relative variance of derivatives that stays unknown: interpolation, and the scenes' spectrum.
+#: It also keeps covariances regular: w nearly obeys a diffusion equation.
+_UNKNOWN = 1e-4
+
+#: Amplitudes z that a scene may have at a place, over the noise's variance: nothing at all, or all
+#: orders of magnitude alike.
+_AMPLITUDES = np.concatenate([[0.0], np.geomspace(1e-4, 1e8, 37)])
+
+#: With fewer extrema than this among the draws the second moments of a ball stand in for the rest.
+_FEW, _BALL = 16, RADIUS**2 / 5
+
+_N = len(ORDERS)
+
+
+class Outcome(NamedTuple):
+    """What becomes of extrema in another shot.
+
+    Attributes
+    ----------
+    survival : ndarray, shape (n,)
+        Share of the draws in which the extremum is there.
+    moments : ndarray, shape (n, 3, 3)
+        Second moments of its shift among these, in (ln sigma, y/sigma, x/sigma).
+    """
+
+    survival: NDArray[np.float64]
+    moments: NDArray[np.float64]
+
+
+def after_noise(
+    jets: NDArray[np.float64],
+    sign: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    grid: NDArray[np.float64],
+) -> Outcome:
+    """Outcome for the extrema of a view without noise, in a shot with noise.
+
+    Parameters
+    ----------
+    jets : ndarray, shape (n, 20)
+        Derivatives at the extrema; their gradient is taken to be 0.
+    sign : ndarray, shape (n,)
+        +1 for maxima, -1 for minima.
+    noise : ndarray, shape (n, 20, 20)
+        Covariance of the derivatives of the shot's noise.
+    grid : ndarray, shape (n, 2)
+        Steps of the detector's grid in ln sigma and in y/sigma.
+
+    Returns
+    -------
+    Outcome
+        Of a shift from the extremum of the view to that of the shot.
+    """
+    mean = _at_extremum(jets)
+    root = np.asarray(np.linalg.cholesky(_regular(noise)), np.float64)
+    certain = np.ones((len(jets), 1))
+    return _drawn(
+        root, np.zeros((len(jets), 1, _N)), certain[:, :, None], certain, mean, sign, grid
+    )
+
+
+def among_scenes(
+    jets: NDArray[np.float64],
+    sign: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    grid: NDArray[np.float64],
+    level: NDArray[np.float64],
+    kappa: float,
+) -> Outcome:
+    """Outcome for extrema that were seen through noise, in another shot with as much noise.
+
+    Parameters
+    ----------
+    jets, sign, noise, grid
+        See `after_noise`; the derivatives are those seen, noise included.
+    level : ndarray, shape (n,)
+        Standard deviation of the noise of a pixel, above 0.
+    kappa : float
+        Ratio of the two Gaussians.
+
+    Returns
+    -------
+    Outcome
+        Of a shift from the extremum of the one shot to that of the other.
+    """
+    root = np.linalg.cholesky(_regular(scene_jets(kappa)))
+    whitening = np.linalg.inv(root)
+    power, axes = np.linalg.eigh(whitening @ _regular(noise) @ whitening.T)
+    power = np.maximum(power, 0.0)[:, None, :]  # of the noise, where the scene's is z
+    seen = np.einsum("nij,ni->nj", axes, _at_extremum(jets) @ whitening.T)[:, None, :]
+    z = (level[:, None] ** 2 * _AMPLITUDES)[:, :, None]
+    total = np.maximum(z + power, np.finfo(float).tiny)
+    likelihood = -0.5 * (np.log(total) + seen**2 / total).sum(axis=2)
+    weight = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
+    cumulative = np.cumsum(weight / weight.sum(axis=1, keepdims=True), axis=1)
+    share = z / total
+    spread = np.sqrt(power * (1 + share))
+    return _drawn(root @ axes, share * seen, spread, cumulative, np.zeros_like(jets), sign, grid)
+
+
+def _at_extremum(jets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Jets without what the detector's own error leaves of a gradient."""
+    jets = jets.copy()
+    jets[:, 1:4] = 0.0
+    return jets
+
+
+def _regular(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance with some more variance everywhere."""
+    variance = np.einsum("...ii->...i", covariance)
+    more = _UNKNOWN * variance + np.finfo(float).tiny
+    regular: NDArray[np.float64] = covariance + more[..., None] * np.eye(covariance.shape[-1])
+    return regular
+
+
+@cache
+def _draws() -> NDArray[np.float64]:
+    """Points of a scrambled Sobol sequence: normal numbers, and one that is uniform."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    points = qmc.Sobol(_N + 1, scramble=True, rng=np.random.default_rng(18)).random(_DRAWS)
+    points[:, :_N] = ndtri(np.clip(points[:, :_N], 1e-9, 1 - 1e-9))
+    return points
+
+
+def _drawn(
+    basis: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    cumulative: NDArray[np.float64],
+    offset: NDArray[np.float64],
+    sign: NDArray[np.float64],
+    grid: NDArray[np.float64],
+) -> Outcome:
+    """Outcome when jets are offset + basis (mean + spread times normal numbers).
+
+    Which mean and spread, `cumulative` says: their probabilities, added up.
+    """
+    spread = np.broadcast_to(spread, mean.shape)
+    count = np.empty(len(sign))
+    moments = np.empty((len(sign), 3, 3))
+    _climb_all(basis, mean, spread, cumulative, offset, sign, grid, _draws(), count, moments)
+    missing = np.maximum(_FEW - count, 0)[:, None, None]
+    moments += missing * _BALL * np.eye(3)
+    moments /= np.maximum(count, _FEW)[:, None, None]
+    return Outcome(count / _DRAWS, moments)
+
+
+@njit(cache=True, nogil=True)
+def _climb_all(basis, mean, spread, cumulative, offset, sign, grid, draws, count, moments):  # noqa: PLR0913
+    size = mean.shape[2]
+    place, jet, coordinate = np.empty(3), np.empty(size), np.empty(size)
+    moments[:] = 0.0
+    for point in range(sign.size):
+        count[point] = 0
+        for draw in draws:
+            k = 0
+            while k < cumulative.shape[1] - 1 and cumulative[point, k] < draw[size]:
+                k += 1
+            for i in range(size):
+                coordinate[i] = mean[point, k, i] + spread[point, k, i] * draw[i]
+            for i in range(size):
+                jet[i] = offset[point, i]
+                for m in range(size):
+                    jet[i] += basis[point, i, m] * coordinate[m]
+            if _climb(jet, sign[point], grid[point], place):
+                count[point] += 1
+                for i in range(3):
+                    for m in range(3):
+                        moments[point, i, m] += place[i] * place[m]
+
+
+@njit(cache=True, nogil=True)
+def _climb(jet, sign, grid, place):
+    """Climb to the extremum of a cubic nearest to the origin, and say whether it is near."""
+    place[:] = 0.0
+    g, h = np.empty(3), np.empty((3, 3))
+    step = np.empty(3)
+    radius2 = RADIUS * RADIUS
+    for _ in range(25):
+        _slopes(jet, -sign, place, g, h)  # of -s w, to be minimised
+        shift = 0.0
+        size = abs(h[0, 0]) + abs(h[1, 1]) + abs(h[2, 2]) + 1e-300
+        settled = True
+        if not _solved(h, shift, g, step):
+            settled = _stands_out(h, grid) and _stationary(h, g, step)
+            while not settled and not _solved(h, shift, g, step):
+                shift = max(2.0 * shift, 0.05 * size)
+        length = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+        factor = min(1.0, 0.2 / length) if length > 0 else 1.0
+        far = 0.0
+        for i in range(3):
+            place[i] -= factor * step[i]
+            far += place[i] ** 2
+        if far > 2.25 * radius2:
+            return False
+        if settled and length < 1e-3:
+            return far < radius2
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _stands_out(h, grid):
+    """Whether a stationary point is an extremum among its 26 neighbours on a grid."""
+    for code in range(14, 27):  # one of each pair of opposite neighbours
+        a = (code // 9 - 1) * grid[0]
+        b = (code // 3 % 3 - 1) * grid[1]
+        c = (code % 3 - 1) * grid[1]
+        along = h[0, 0] * a * a + h[1, 1] * b * b + h[2, 2] * c * c
+        along += 2.0 * (h[0, 1] * a * b + h[0, 2] * a * c + h[1, 2] * b * c)
+        if not along > 0:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _stationary(h, g, step):
+    """Solve H step = g by cofactors; False where H is singular."""
+    c0 = h[1, 1] * h[2, 2] - h[1, 2] * h[1, 2]
+    c1 = h[0, 2] * h[1, 2] - h[0, 1] * h[2, 2]
+    c2 = h[0, 1] * h[1, 2] - h[0, 2] * h[1, 1]
+    determinant = h[0, 0] * c0 + h[0, 1] * c1 + h[0, 2] * c2
+    if determinant == 0:
+        return False
+    c11 = h[0, 0] * h[2, 2] - h[0, 2] * h[0, 2]
+    c12 = h[0, 1] * h[0, 2] - h[0, 0] * h[1, 2]
+    c22 = h[0, 0] * h[1, 1] - h[0, 1] * h[0, 1]
+    step[0] = (c0 * g[0] + c1 * g[1] + c2 * g[2]) / determinant
+    step[1] = (c1 * g[0] + c11 * g[1] + c12 * g[2]) / determinant
+    step[2] = (c2 * g[0] + c12 * g[1] + c22 * g[2]) / determinant
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _solved(h, shift, g, step):
+    """Solve (H + shift) step = g by Cholesky's decomposition; False where H is not definite."""
+    a = h[0, 0] + shift
+    if not a > 0:
+        return False
+    l00 = math.sqrt(a)
+    l10, l20 = h[1, 0] / l00, h[2, 0] / l00
+    b = h[1, 1] + shift - l10 * l10
+    if not b > 0:
+        return False
+    l11 = math.sqrt(b)
+    l21 = (h[2, 1] - l20 * l10) / l11
+    c = h[2, 2] + shift - l20 * l20 - l21 * l21
+    if not c > 0:
+        return False
+    l22 = math.sqrt(c)
+    u = g[0] / l00
+    v = (g[1] - l10 * u) / l11
+    w = (g[2] - l20 * u - l21 * v) / l22
+    step[2] = w / l22
+    step[1] = (v - l21 * step[2]) / l11
+    step[0] = (u - l10 * step[1] - l20 * step[2]) / l00
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _slopes(jet, factor, d, g, h):
+    """Gradient and Hessian of a cubic at a displacement, times a factor."""
+    s, y, x = d[0], d[1], d[2]
+    t = jet[10:]
+    h[0, 0] = factor * (jet[4] + t[0] * s + t[1] * y + t[2] * x)
+    h[0, 1] = factor * (jet[5] + t[1] * s + t[3] * y + t[4] * x)
+    h[0, 2] = factor * (jet[6] + t[2] * s + t[4] * y + t[5] * x)
+    h[1, 1] = factor * (jet[7] + t[3] * s + t[6] * y + t[7] * x)
+    h[1, 2] = factor * (jet[8] + t[4] * s + t[7] * y + t[8] * x)
+    h[2, 2] = factor * (jet[9] + t[5] * s + t[8] * y + t[9] * x)
+    h[1, 0], h[2, 0], h[2, 1] = h[0, 1], h[0, 2], h[1, 2]
+    # (H(0) + H(d)) d / 2 is H d + T[d, d] / 2
+    for i in range(3):
+        g[i] = factor * jet[1 + i]
+    q0 = factor * (jet[4] * s + jet[5] * y + jet[6] * x)
+    q1 = factor * (jet[5] * s + jet[7] * y + jet[8] * x)
+    q2 = factor * (jet[6] * s + jet[8] * y + jet[9] * x)
+    g[0] += 0.5 * (q0 + h[0, 0] * s + h[0, 1] * y + h[0, 2] * x)
+    g[1] += 0.5 * (q1 + h[1, 0] * s + h[1, 1] * y + h[1, 2] * x)
+    g[2] += 0.5 * (q2 + h[2, 0] * s + h[2, 1] * y + h[2, 2] * x)
