@@ -136,9 +136,9 @@ def test_samples_that_are_too_coarse_are_warned_of(photo, capsys):
 
 
 def test_all_octaves_end_at_a_quarter_of_the_shorter_side():
-    image = np.random.default_rng(1).random((70, 90))
-    found, three = (detect_keypoints(image, 0.8, n_oct=n) for n in ("all", 3))
-    pd.testing.assert_frame_equal(found, three)  # 1.1 * 2**3 <= 70 / 4 < 1.1 * 2**4
+    image = np.random.default_rng(1).random((120, 150))
+    found, four = (detect_keypoints(image, 0.8, n_oct=n) for n in ("all", 4))
+    pd.testing.assert_frame_equal(found, four)  # 1.1 * 2**4 <= 120 / 4 < 1.1 * 2**5
     assert (found["octave"] == 2).any()
 
 
