@@ -106,6 +106,13 @@ def keypoint_uncertainty(
     one picture (`keystab.prediction.detector_error`), is added to it, and `survival` is multiplied
     by the share of true extrema that the detector finds there.
 
+    Measured on views of four photographs that did not steer the model (288 x 160 pixels, blur 0.8,
+    two octaves, 40 pairs of shots at each noise): see figure uncertainty and the docstring of
+    `keystab.experiments.uncertainty_calibration`. From one shot, 90 % ellipses of the difference of
+    two shots hold 0.89 to 0.91 at noise of 0.003 to 0.03. Against the scene's own extremum they are
+    too short where noise is large: 90 % ellipses hold 0.89 at 0.003, 0.85 at 0.01, 0.79 at 0.03,
+    because two shots that agree may err alike.
+
     The shift of an extremum whose survival is low is not normal: it is limited by the distance at
     which it would not count as the same. Near the ends of the range of scales that is searched, a
     keypoint may leave it; ``survival`` does not count that. Where ``sigma`` is close to
