@@ -153,11 +153,11 @@ def keypoint_uncertainty(
     )
     columns: dict[str, NDArray[np.float64]] = {name: np.empty(len(keypoints)) for name in _COLUMNS}
     sampling = (n_spo, delta_min or balanced_delta(n_spo, kappa, sigma_min), sigma_min, refine)
+    jets, level = _at_keypoints(array, keypoints, camera_blur, kappa, (offset, slope))
     for start in range(0, len(keypoints), _BATCH):
         rows = slice(start, start + _BATCH)
-        part = _error_bars(
-            array, keypoints.iloc[rows], camera_blur, kappa, (offset, slope), sampling, noise_free
-        )
+        seen = keypoints.iloc[rows], jets[rows], level[rows]
+        part = _error_bars(*seen, camera_blur, kappa, sampling, noise_free)
         for name, values in part.items():
             columns[name][rows] = values
     return keypoints.assign(**columns)
@@ -193,26 +193,36 @@ def _noise_model(
     return validation.number("noise", noise, least=0) ** 2, 0.0
 
 
-def _error_bars(
+def _at_keypoints(
     image: NDArray[np.float64],
     keypoints: pd.DataFrame,
     camera_blur: float,
     kappa: float,
     noise: tuple[float, float],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Derivatives at the keypoints, and the standard deviation of the noise there."""
+    sigma, y, x = (keypoints[name].to_numpy(dtype=np.float64) for name in ("sigma", "y", "x"))
+    scale = np.maximum(sigma, camera_blur)  # a refined scale may lie below
+    offset, slope = noise
+    variance = np.full(len(keypoints), offset)
+    if slope:
+        variance += slope * local_image(image, scale, y, x, camera_blur)
+    jets = local_jets(image, scale, y, x, camera_blur, kappa)
+    return jets, np.sqrt(np.maximum(variance, 0.0))
+
+
+def _error_bars(
+    keypoints: pd.DataFrame,
+    jets: NDArray[np.float64],
+    level: NDArray[np.float64],
+    camera_blur: float,
+    kappa: float,
     sampling: tuple[int, float, float, bool],
     noise_free: bool,
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns that keypoints get, from their table alone: no row depends on another."""
-    sigma, y, x, sign = (
-        keypoints[name].to_numpy(dtype=np.float64) for name in ("sigma", "y", "x", "sign")
-    )
-    scale = np.maximum(sigma, camera_blur)  # a refined scale may lie below
-    jets = local_jets(image, scale, y, x, camera_blur, kappa)
-    offset, slope = noise
-    level = np.full(len(keypoints), offset)
-    if slope:
-        level += slope * local_image(image, scale, y, x, camera_blur)
-    level = np.sqrt(np.maximum(level, 0.0))
+    """Columns that keypoints get from what is known at each: no row depends on another."""
+    sigma, sign = (keypoints[name].to_numpy(dtype=np.float64) for name in ("sigma", "sign"))
+    scale = np.maximum(sigma, camera_blur)
     covariance = noise_jets(scale, camera_blur, kappa) * level[:, None, None] ** 2
     n_spo, delta_min, sigma_min, refined = sampling
     octave = keypoints["octave"].to_numpy(dtype=np.int64)
