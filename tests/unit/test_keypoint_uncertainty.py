@@ -16,7 +16,7 @@ from keystab.prediction.local_jets import local_jets
 from keystab.prediction.noise_covariance import ORDERS, band_moments, noise_jets, scene_jets
 from keystab.prediction.noise_level import estimated_noise
 from keystab.prediction.survival import after_noise
-from keystab.prediction.uncertainty import _error_bars
+from keystab.prediction.uncertainty import _at_keypoints, _error_bars
 from keystab.scalespace.continuous_dog import DogSeries
 
 KAPPA, BLUR = 2 ** (1 / 3), 0.8
@@ -275,9 +275,12 @@ def test_no_row_depends_on_another():
     image = 0.05 * noise_of((40, 40), 7)
     table = detect_keypoints(image, BLUR, 5)
     order = np.random.default_rng(0).permutation(len(table))
-    settings = (BLUR, KAPPA, (0.05**2, 0.0), (5, keystab.balanced_delta(5), 1.1, True), False)
-    straight = _error_bars(image, table, *settings)
-    mixed = _error_bars(image, table.iloc[order[:20]], *settings)
+    jets, level = _at_keypoints(image, table, BLUR, KAPPA, (0.05**2, 0.0))
+    settings = (BLUR, KAPPA, (5, keystab.balanced_delta(5), 1.1, True), False)
+    straight = _error_bars(table, jets, level, *settings)
+    part = table.iloc[order[:20]]
+    seen = _at_keypoints(image, part, BLUR, KAPPA, (0.05**2, 0.0))
+    mixed = _error_bars(part, *seen, *settings)
     for name, values in straight.items():
         assert values[order[:20]] == pytest.approx(mixed[name], rel=1e-9), name
 

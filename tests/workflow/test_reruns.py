@@ -30,10 +30,11 @@ EVALUATING = ACCEPTING | {
     "refinement",
 }
 EVALUATING |= PREDICTING
+BARS = {"calibrate_bars", "uncertainty"}
 TRUTHS = {"find_true_extrema", "find_scene_extrema"}
 ONE_VIEW = {"detect", "detect_grid", "count_refined"} | SAMPLINGS
 DETECTION = ONE_VIEW | {"detect_views", "detect_kappas", "detect_variant"} | MATCHING | EVALUATING
-DETECTION |= {"detect_cosine"}
+DETECTION |= {"detect_cosine"} | BARS
 STILL = {"simulate", "scale_space", "detect_kappas", "detect_variant", "detect_cosine"} | ONE_VIEW
 STILL |= KAPPAS | VARIANTS | TRUTHS | EVALUATING
 SIMULATION = STILL | DETECTION | TRUTHS | {"describe_views", "crop_views", "fig2"}
@@ -64,7 +65,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
         ("src/keystab/detection/extrema.py", "def discrete_extrema(", "# a comment\ndef discrete_extrema(", set()),
         ("src/keystab/detection/extrema.py", '"""Discrete extrema', '"""Discrete, local extrema', set()),
         ("src/keystab/detection/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS | {"detect_blobs"}),
-        ("src/keystab/evaluation/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "evaluate_keypoints", "truth"} | PREDICTING),
+        ("src/keystab/evaluation/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "evaluate_keypoints", "truth"} | PREDICTING | BARS),
         ("src/keystab/__init__.py", '"fit_psf": ', '"blob_image": "scalespace.gaussian_blobs",\n    "fit_psf": ', set()),
         ("src/keystab/stages/cut_cubes.py", "    unique = ", "    MORE = 1\n    unique = ", {"cut_cubes", "fig6"}),
         ("src/keystab/study/settings.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", set()),
@@ -75,7 +76,7 @@ def test_nothing_to_do_when_finished_copied_and_touched(finished):
         ("src/keystab/camera/simulation.py", *MORE, SIMULATION),
         # The contract for code: what depends on it, and nothing else.
         ("src/keystab/__init__.py", '    "InputError": "errors",', '    "another": "errors",\n    "InputError": "errors",', set()),
-        ("src/keystab/evaluation/intervals.py", *MORE, (MATCHING | EVALUATING) - KAPPAS),
+        ("src/keystab/evaluation/intervals.py", *MORE, (MATCHING | EVALUATING | BARS) - KAPPAS),
         ("src/keystab/evaluation/recall_precision.py", *MORE, EVALUATING),
         ("src/keystab/detection/sift_filters.py", *MORE, {"match_sift", "fig7"}),
         ("src/keystab/utils/validation.py", *MORE, EVERYTHING - {"simulate", "describe_views", "semigroup", "crop_views", "fig1", "fig2"}),
@@ -115,7 +116,7 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
     [
         ("comparison: {border: 3}", set()),  # 3.0
         ("refinement: {max_offset: 0.7}", {"count_refined"} | VIEWS | SWEEPS | KAPPAS | BLOBS | ACCEPTING),
-        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "evaluate_grid", "detect_variant"} - VARIANTS),
+        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "evaluate_grid", "detect_variant"} - VARIANTS - BARS),
         ("comparison: {match_sign: true}", MATCHING),
         ("comparison: {last_scale: 2.0}", {"count_refined"} | SAMPLINGS | VIEWS | SWEEPS | VARIANTS),
         ("comparison: {scale_ratio: 1.5}", MATCHING | EVALUATING),
@@ -138,6 +139,8 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("sets: {zooms: {zoom: 1.4}}", {"simulate", "detect_views", "match_views", "fig8"}),
         ("truth: {last_scale: 1.9}", EVALUATING | TRUTHS),
         ("truth: {most_iterations: 4}", {"evaluate_refinement", "refinement"}),
+        ("uncertainty: {n_pairs: 3}", BARS),
+        ("sets: {shots: {blur: [0.8, 0.9]}}", BARS | {"simulate"}),
         ("draft: false", FIGURES),
         # 1.1 is also the blur and 0.0 also the shift: the set of values stays the same.
         ("sets: {still: {noise: 1.1, step: 20}}", STILL),

@@ -75,6 +75,7 @@ sets:
   unknown_blur: {n_views: 3, step: 40, n_spo: [4], sweep: {blur_spread: [0.1, 0.4]}}
   noise: {n_views: 2, step: 40, n_spo: [4], sweep: {noise: [0.01, 0.02]}}
   blur_errors: {blur: [0.7, 0.3], step: 40, n_spo: [4]}
+  shots: {blur: [0.8, 1.1], step: 40, height: 40, width: 60}
 stability: {curve_n_spo: [3, 5], n_resamples: 100}
 samplings: {n_spo: [3, 4]}
 floor: {settles_at: 4}

@@ -40,6 +40,7 @@ def test_whole_study_at_the_papers_settings(project):
         ("figures/quick/fig7.pdf", {"simulate", "detect_views", "match_views", "match_sift", "fig7"}),
         ("figures/quick/fig9.pdf", {"simulate", "detect_kappas", "match_kappas", "fig9"}),
         ("figures/quick/figS1.png", {"simulate", "detect_views", "match_views", "figS1"}),
+        ("figures/quick/uncertainty.pdf", {"simulate", "calibrate_bars", "uncertainty"}),
         ("figures/quick/predictors.pdf", {"simulate", "scale_space", "detect", "match_samplings", "find_true_extrema", "score_predictors", "predictors"}),
     ],
 )  # fmt: skip

@@ -283,7 +283,8 @@ rule calibrate_bars:
         **stage(
             "calibrate_bars",
             parameters.Scales,
-            parameters.Compared,
+            "comparison.border",
+            "comparison.first_scale",
             parameters.ShotPairs,
         ),
     message:

@@ -4,7 +4,8 @@ Each pair of shots is one view with the noise of two draws. Keypoints and their 
 the first shot alone (or from the view without noise); whether a keypoint is found again, and where,
 is looked up in the second. What a user has today is judged on the same keypoints: one error per
 octave, the inverse Hessian alone, and contrast as a guess of survival. Rivals that give no absolute
-size are scaled by one factor, fitted to what they are judged on, which favours them.
+size are scaled by a factor, fitted to what they are judged on and at each noise anew, which favours
+them.
 
 Criteria, for additive noise and pooled over pairs, written before scenes were judged that had not
 steered the model. The pictures ``coldwarm`` and ``street`` did, and ``lake`` had been looked at
@@ -253,6 +254,19 @@ def calibrated_factor(squared: NDArray[np.float64], dimensions: int) -> float:
     return float(np.median(squared) / chi2.ppf(0.5, dimensions))
 
 
+FITTED = ("predicted", "against", "kind", "blur", "noise")
+"""Columns of a table in whose groups rivals are scaled: as if they knew the noise."""
+
+
+def _factors(table: pd.DataFrame, squared: pd.Series, dimensions: int) -> pd.Series:
+    """Factor of the covariance of each row."""
+    columns = [name for name in FITTED if name in table]
+    if not columns:
+        return pd.Series(calibrated_factor(squared.to_numpy(), dimensions), squared.index)
+    groups = squared.groupby([table[name] for name in columns])
+    return groups.transform(lambda part: calibrated_factor(part.to_numpy(), dimensions))
+
+
 def coverage_table(
     table: pd.DataFrame,
     by: Sequence[str] = (),
@@ -267,7 +281,8 @@ def coverage_table(
     by : sequence of str
         Columns that tell apart what is not pooled.
     methods : sequence of str
-        Of `METHODS`. Rivals get one factor each for position and scale, over the whole table.
+        Of `METHODS`. Rivals get a factor each for position and for scale, fitted anew wherever a
+        column of `FITTED` differs.
 
     Returns
     -------
@@ -281,7 +296,7 @@ def coverage_table(
         for quantity, dimensions in (("position", 2), ("scale", 1)):
             squared = found[f"{quantity}_{method}"]
             if method != "bars":
-                squared = squared / calibrated_factor(squared.to_numpy(), dimensions)
+                squared = squared / _factors(found, squared, dimensions)
             for key, part in _groups(found, by):
                 values = squared.loc[part.index]
                 for level in LEVELS:

@@ -107,6 +107,18 @@ def keypoint_uncertainty(
     one picture (`keystab.prediction.detector_error`), is added to it, and `survival` is multiplied
     by the share of true extrema that the detector finds there.
 
+    Measured on views of four photographs that did not steer the model (``casamila``, ``otter``,
+    ``lanterns``, ``colosseum``; 288 x 160 pixels, blur 0.8, two octaves, 40 pairs of shots at each
+    noise): from one shot, 90 % ellipses of the difference of two shots hold 0.913, 0.897, 0.891 at
+    noise of 0.003, 0.01, 0.03, and the survival is off by 0.009, 0.005, 0.018 on average over bins
+    of a tenth (by 0.056 on one photograph). Against the scene's own extremum ellipses are too short
+    where noise is large: 90 % ellipses hold 0.904, 0.864, 0.814, because two shots that agree may
+    err alike.
+
+    JPEG hides noise from the estimate: on shots of ``casamila`` of quality 90 (8 pairs), 90 %
+    ellipses hold 0.57 and 0.34 at noise of 0.003 and 0.01 when it is estimated, and 0.64 and 0.87
+    when it is given. Give `noise` for compressed pictures.
+
     The shift of an extremum whose survival is low is not normal: it is limited by the distance at
     which it would not count as the same. Near the ends of the range of scales that is searched, a
     keypoint may leave it; ``survival`` does not count that. Where ``sigma`` is close to
@@ -146,12 +158,12 @@ def keypoint_uncertainty(
     )
     columns: dict[str, NDArray[np.float64]] = {name: np.empty(len(keypoints)) for name in _COLUMNS}
     sampling = (n_spo, delta_min or balanced_delta(n_spo, kappa, sigma_min), sigma_min, refine)
+    jets, level = _at_keypoints(array, keypoints, camera_blur, kappa, (offset, slope))
     batches = range(0, len(keypoints), _BATCH)
     for start in progress_if_watched(batches, len(batches), "error bars"):
         rows = slice(start, start + _BATCH)
-        part = _error_bars(
-            array, keypoints.iloc[rows], camera_blur, kappa, (offset, slope), sampling, noise_free
-        )
+        seen = keypoints.iloc[rows], jets[rows], level[rows]
+        part = _error_bars(*seen, camera_blur, kappa, sampling, noise_free)
         for name, values in part.items():
             columns[name][rows] = values
     return keypoints.assign(**columns)
@@ -187,26 +199,36 @@ def _noise_model(
     return validation.number("noise", noise, least=0) ** 2, 0.0
 
 
-def _error_bars(
+def _at_keypoints(
     image: NDArray[np.float64],
     keypoints: pd.DataFrame,
     camera_blur: float,
     kappa: float,
     noise: tuple[float, float],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Derivatives at the keypoints, and the standard deviation of the noise there."""
+    sigma, y, x = (keypoints[name].to_numpy(dtype=np.float64) for name in ("sigma", "y", "x"))
+    scale = np.maximum(sigma, camera_blur)  # a refined scale may lie below
+    offset, slope = noise
+    variance = np.full(len(keypoints), offset)
+    if slope:
+        variance += slope * local_image(image, scale, y, x, camera_blur)
+    jets = local_jets(image, scale, y, x, camera_blur, kappa)
+    return jets, np.sqrt(np.maximum(variance, 0.0))
+
+
+def _error_bars(
+    keypoints: pd.DataFrame,
+    jets: NDArray[np.float64],
+    level: NDArray[np.float64],
+    camera_blur: float,
+    kappa: float,
     sampling: tuple[int, float, float, bool],
     noise_free: bool,
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns that keypoints get, from their table alone: no row depends on another."""
-    sigma, y, x, sign = (
-        keypoints[name].to_numpy(dtype=np.float64) for name in ("sigma", "y", "x", "sign")
-    )
-    scale = np.maximum(sigma, camera_blur)  # a refined scale may lie below
-    jets = local_jets(image, scale, y, x, camera_blur, kappa)
-    offset, slope = noise
-    level = np.full(len(keypoints), offset)
-    if slope:
-        level += slope * local_image(image, scale, y, x, camera_blur)
-    level = np.sqrt(np.maximum(level, 0.0))
+    """Columns that keypoints get from what is known at each: no row depends on another."""
+    sigma, sign = (keypoints[name].to_numpy(dtype=np.float64) for name in ("sigma", "sign"))
+    scale = np.maximum(sigma, camera_blur)
     covariance = noise_jets(scale, camera_blur, kappa) * level[:, None, None] ** 2
     n_spo, delta_min, sigma_min, refined = sampling
     octave = keypoints["octave"].to_numpy(dtype=np.int64)

@@ -79,6 +79,7 @@ Scores
     gain : table of what models gain
 
 Error bars
+    first_scale : lower end of the scales, over sigma-min
     coverage : table of the shares that ellipses hold
     strata : the same in parts of the keypoints
     reliability : table of what returns, against what was predicted

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from keystab.parameters import Compared, Scales, ShotPairs
+from keystab.parameters import Scales, ShotPairs
 from keystab.stages._command import Store, command
 
 
@@ -10,7 +10,8 @@ from keystab.stages._command import Store, command
 def main(
     views: Store,
     scales: Scales,
-    compared: Compared,
+    border: float,
+    first_scale: float,
     shots: ShotPairs,
     *,
     coverage: Path,
@@ -34,8 +35,8 @@ def main(
         scales.sigma_min,
         scales.kappa,
         shots.n_oct,
-        compared.border,
-        compared.first_scale,
+        border,
+        first_scale,
     )
     images = [(view.image, view.blur) for view in read_views(*views)]
     table = shot_pairs(images, shots.noise, shots.n_pairs, shots.n_pairs_others, detector)
