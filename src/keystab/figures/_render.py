@@ -1,7 +1,8 @@
 """What every figure's command does: read tables, draw, write a PDF and a PNG.
 
 The bytes written depend on the tables, the code and the versions of the libraries, not on the
-time, the folder or the reader's matplotlib settings. Each file says in its metadata what it was drawn from.
+time, the folder or the reader's matplotlib settings. Each file says in its metadata
+what it was drawn from.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 from keystab._version import __version__
 from keystab.errors import InputError
 from keystab.figures import style
-from keystab.utils.files import written_whole
 from keystab.io.figure_metadata import PNG_KEY, FigureMetadata, digests_of
+from keystab.utils.files import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -131,8 +132,12 @@ def main(
     parser.add_argument("--pdf", type=Path, help="PDF to write")
     parser.add_argument("--png", type=Path, help="PNG to write, at 300 dots per inch")
     parser.add_argument("--draft", action="store_true", help="mark the figure as a draft")
-    parser.add_argument("--code", metavar="SHA256", help="fingerprint of the code, for the metadata")
-    parser.add_argument("--lock", metavar="SHA256", help="digest of the lock file, for the metadata")
+    parser.add_argument(
+        "--code", metavar="SHA256", help="fingerprint of the code, for the metadata"
+    )
+    parser.add_argument(
+        "--lock", metavar="SHA256", help="digest of the lock file, for the metadata"
+    )
     args = parser.parse_args(argv)
     try:
         if args.pdf is None and args.png is None:

@@ -242,7 +242,9 @@ def views_figure(curves: DataFrame, table: DataFrame, draft: bool = False) -> Fi
                 rows = curves[(curves["n_spo"] == n_spo) & (curves["detections"] == detections)]
                 if len(rows):
                     dashes = "-" if n_spo == finest else (0, (2.5, 1.2))
-                    labels.append(curve(stable, rows, colour, f"{n_spo}, {detections}", linestyle=dashes))
+                    labels.append(
+                        curve(stable, rows, colour, f"{n_spo}, {detections}", linestyle=dashes)
+                    )
         for ax, name, quantity in ((place, "b", "location"), (scale, "c", "log2_sigma")):
             style.letter(ax, name, QUANTITIES[quantity][0])
             precision(ax, table, quantity, medians=quantity == "location")

@@ -236,9 +236,7 @@ def _draw_ratio(ax: Axes, theory: DataFrame) -> None:
     sigma, ratio = rows["sigma"].to_numpy(), rows["octave_ratio"].to_numpy()
     colour = palette.THEORY_COLOURS["blob"]
     ax.plot(sigma, ratio, color=colour, label="octave_ratio")
-    style.direct_label(
-        ax, sigma[0], ratio[0], "closed form", colour, right=8.0, up=-3.0, ha="left"
-    )
+    style.direct_label(ax, sigma[0], ratio[0], "closed form", colour, right=8.0, up=-3.0, ha="left")
     ax.axhline(PAPERS_RATIO, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=1)
     text = f"in the paper: {PAPERS_RATIO:g}"
     style.direct_label(ax, sigma[0], PAPERS_RATIO, text, palette.GREY, 4.0, -6.0, ha="left")

@@ -49,17 +49,18 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     ----------
     tables : mapping
         ``fig7_curves``: stability curves at a coarse and a fine sampling; ``fig7_precision``: one
-        row per sampling, kind of detection and quantity, with the refinement that is usual; ``fig7_counts``: one row per sampling and
-        choice; ``fig7_shipped``: curves of SIFT's own refinement, ``unfiltered`` and ``filtered``.
+        row per sampling, kind of detection and quantity, with the refinement that is usual;
+        ``fig7_counts``: one row per sampling and choice; ``fig7_shipped``: curves of SIFT's own
+        refinement, ``unfiltered`` and ``filtered``.
     draft : bool
         Say on the figure that its numbers come from quick settings.
 
     Returns
     -------
     matplotlib Figure
-        a, b: curves at the coarse and at the fine sampling, a row for each ``N_interp``, a curve for
-        each ``M_offset``, discrete extrema dotted; c: precision of the location; d: of the scale;
-        e: numbers of keypoints seen in all views (dots) and in any (ticks); f: curves of
+        a, b: curves at the coarse and at the fine sampling, a row for each ``N_interp``, a curve
+        for each ``M_offset``, discrete extrema dotted; c: precision of the location; d: of the
+        scale; e: numbers of keypoints seen in all views (dots) and in any (ticks); f: curves of
         SIFT's own refinement.
 
     Raises

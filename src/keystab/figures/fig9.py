@@ -71,7 +71,10 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         style.letter(matrix, "b", f"occurrence of {len(seen.stability)} unique keypoints")
         image = draw_matrix(matrix, seen.coloured(), palette.stability_map())
         _label_rows(matrix, seen.sets)
-        most = Share(float((seen.stability > MOST).mean()), f"with more than {100 * MOST:.0f} % of the ratios")
+        most = Share(
+            float((seen.stability > MOST).mean()),
+            f"with more than {100 * MOST:.0f} % of the ratios",
+        )
         always = Share(float(seen.detected.all(axis=0).mean()), "with all")
         mark_groups(matrix, len(seen.stability), {"stable": (most, f"{most}, {always}")})
         figure.colorbar(image, cax=scale, label="stability").outline.set_visible(False)

@@ -17,7 +17,16 @@ if TYPE_CHECKING:
 
 TABLES = {
     "figS3.csv": ("model", "pitch", "f_number", "c", "residual"),
-    "figS3_profiles.csv": ("model", "f_number", "pitch", "radius", "psf", "gaussian", "c", "residual"),
+    "figS3_profiles.csv": (
+        "model",
+        "f_number",
+        "pitch",
+        "radius",
+        "psf",
+        "gaussian",
+        "c",
+        "residual",
+    ),
 }
 """Files read, with the columns that they must have."""
 
@@ -41,8 +50,8 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     Parameters
     ----------
     tables : mapping
-        ``figS3``: the table of `keystab.experiments.camera_blur.optics_table`; ``figS3_profiles``: that of
-        `keystab.experiments.camera_blur.profile_table`.
+        ``figS3``: the table of `keystab.experiments.camera_blur.optics_table`;
+        ``figS3_profiles``: that of `keystab.experiments.camera_blur.profile_table`.
     draft : bool
         Say on the figure that its numbers come from quick settings.
 

@@ -103,12 +103,12 @@ def _plain_ticks(ax: Axes, low: float, high: float) -> None:
 
 
 def _power(kappa: float) -> str:
-    """Return a ratio as a root of 2 where it is one.
+    r"""Return a ratio as a root of 2 where it is one.
 
     Examples
     --------
     >>> _power(2 ** (1 / 3)), _power(1.6)
-    ('$\\\\kappa = 2^{1/3}$', '$\\\\kappa = 1.6$')
+    ('$\\kappa = 2^{1/3}$', '$\\kappa = 1.6$')
     """
     root = 1 / np.log2(kappa)
     whole = abs(root - round(root)) < 1e-6
@@ -154,7 +154,11 @@ def _draw_errors(ax: Axes, samplings: DataFrame, operators: DataFrame) -> None:
     names = {"discrete": "on the grid", "refined": "refined"}
     finest = samplings["n_spo"].max()
     groups = [
-        (f"{names[detection]}, {style.N_SPO} = {n_spo}", palette.DETECTION_COLOURS[detection], n_spo)
+        (
+            f"{names[detection]}, {style.N_SPO} = {n_spo}",
+            palette.DETECTION_COLOURS[detection],
+            n_spo,
+        )
         for n_spo in sorted(set(samplings["n_spo"]))
         for detection in names
     ]

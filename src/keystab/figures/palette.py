@@ -108,7 +108,8 @@ ASSUMED_COLOURS = {"below": "#D55E00", "right": INK, "above": "#0072B2"}
 
 
 _SHADES = (
-    "#60ceac", "#40b7ad", "#359eaa", "#3485a5", "#366ca0", "#3d5195", "#403a76", "#36274d", "#251729",
+    "#60ceac", "#40b7ad", "#359eaa", "#3485a5", "#366ca0", "#3d5195", "#403a76", "#36274d",
+    "#251729",
 )  # fmt: skip
 """Ordered quantities, from light to dark: seaborn's "mako", which takes seconds to import."""
 
@@ -143,7 +144,7 @@ def n_spo_colour(n_spo: int, lowest: int = 3, highest: int = 19) -> tuple[float,
 
 
 def offset_colour(max_offset: float) -> tuple[float, float, float]:
-    """Return the colour of refined keypoints by ``M_offset``: light for a tight limit, dark for none.
+    """Return the colour of keypoints by ``M_offset``: light for a tight limit, dark for none.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Figure predictors: does a single detection show whether it can be trusted?"""
+"""Figure predictors: does a single detection show whether it can be trusted?"""  # noqa: D400
 
 from __future__ import annotations
 
@@ -132,11 +132,14 @@ def _draw_areas(
         if share.notna().any():
             ax.text(1.09, height, f"{share.mean():.0f}", transform=ax.get_yaxis_transform(),
                     fontsize=style.SMALL, color=palette.INK, va="center", ha="right")  # fmt: skip
-    ax.text(1.1, 1.012, "rejected %", transform=ax.transAxes, fontsize=style.SMALL, color=palette.GREY,
-            va="bottom", ha="right")  # fmt: skip
+    head = {"transform": ax.transAxes, "fontsize": style.SMALL, "color": palette.GREY}
+    ax.text(1.1, 1.012, "rejected %", va="bottom", ha="right", **head)
     ax.axvline(0.5, color=palette.GREY, linewidth=0.7, linestyle=":")
     ax.set_yticks(list(place.values()), [NAMES[name] for name in place])
-    ax.set(xlim=(float(np.nanmin([0.4, table["auc"].min() - 0.02])), 1.0), ylim=(max(place.values()) + 0.6, -0.6))
+    ax.set(
+        xlim=(float(np.nanmin([0.4, table["auc"].min() - 0.02])), 1.0),
+        ylim=(max(place.values()) + 0.6, -0.6),
+    )
     ax.set_xlabel("area under the ROC curve")
     style.finish_axes(ax)
 
@@ -170,9 +173,7 @@ def _draw_curves(ax: Axes, tables: Tables, label: str) -> None:
     }
     single = NAMES[best.iloc[0]] if best.nunique() == 1 else "best single one"
     names = {"best": single} | {name: NAMES[name] for name in MODELS[1:]}
-    curves = {
-        key: rows.sort_values("kept") for key, rows in roc.groupby(["picture", "predictor"])
-    }
+    curves = {key: rows.sort_values("kept") for key, rows in roc.groupby(["picture", "predictor"])}
     # Where two agree, the thin line of the second shows on the first.
     for line, name, width in ((2, "combined_end", 2.2), (0, "best", 1.2), (1, "combined", 1.1)):
         colour = palette.MODEL_COLOURS[name]
