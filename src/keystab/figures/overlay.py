@@ -141,7 +141,12 @@ def _canvas(crop: NDArray[np.float64], first: tuple[int, int]) -> tuple[Figure, 
     figure = Figure(figsize=(max(width, 6.0), height + _FOOT), layout="none")
     whole_width, whole_height = figure.get_size_inches()
     axes = figure.add_axes(
-        (0.5 - width / whole_width / 2, _FOOT / whole_height, width / whole_width, height / whole_height)
+        (
+            0.5 - width / whole_width / 2,
+            _FOOT / whole_height,
+            width / whole_width,
+            height / whole_height,
+        )
     )
     (top, left), (bottom, right) = first, (first[0] + crop.shape[0], first[1] + crop.shape[1])
     low, high = np.quantile(crop, [0.002, 0.998])

@@ -98,7 +98,9 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         for ax, name, title in zip(axes, "abcdef", titles, strict=True):
             style.letter(ax, name, title)
         _draw_levels(axes[0], _usual(coverage, blur))
-        _draw_cases(axes[1], coverage[(coverage["kind"] == "additive") & (coverage["blur"] == blur)])
+        _draw_cases(
+            axes[1], coverage[(coverage["kind"] == "additive") & (coverage["blur"] == blur)]
+        )
         _draw_kinds(axes[2], coverage, blur)
         _draw_strata(axes[3], tables["uncertainty_strata"])
         _draw_reliability(axes[4], _usual(tables["uncertainty_reliability"], blur))
