@@ -125,24 +125,6 @@ def shade(share: float) -> tuple[float, float, float]:
     return _between(_SHADES, np.linspace(0.0, 1.0, len(_SHADES)), share)
 
 
-def n_spo_colour(n_spo: int, lowest: int = 3, highest: int = 19) -> tuple[float, float, float]:
-    """Return the colour of a sampling: light for few scales per octave, dark for many.
-
-    Parameters
-    ----------
-    n_spo : int
-        Scales per octave; values outside the range take the colour of its nearer end.
-    lowest, highest : int
-        The range of the study.
-
-    Examples
-    --------
-    >>> n_spo_colour(2) == n_spo_colour(3) != n_spo_colour(15)
-    True
-    """
-    return shade(min(max((n_spo - lowest) / (highest - lowest), 0.0), 1.0))
-
-
 def offset_colour(max_offset: float) -> tuple[float, float, float]:
     """Return the colour of keypoints by ``M_offset``: light for a tight limit, dark for none.
 
