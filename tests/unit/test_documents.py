@@ -135,7 +135,13 @@ def test_settings_of_deviations_exist():
 def test_commands_of_the_readme_are_understood():
     lines = "\n".join(blocks("README.md", "sh")).splitlines()
     commands = [shlex.split(line) for line in lines if line.startswith("keystab ")]
-    assert {command[1] for command in commands} == {"simulate", "detect", "truth", "inspect"}
+    assert {command[1] for command in commands} == {
+        "simulate",
+        "detect",
+        "truth",
+        "inspect",
+        "uncertainty",
+    }
     for command in commands:
         build_parser().parse_args(command[1:])  # exits where it does not understand
 
