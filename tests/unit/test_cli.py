@@ -115,7 +115,11 @@ def test_truth_passes_every_parameter(picture, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     "command",
-    [f"detect PICTURE {BLUR} -o LINK", f"truth PICTURE {BLUR} --sigma-max 1.4 --n-spo 3 -o LINK", "simulate PICTURE LINK"],
+    [
+        f"detect PICTURE {BLUR} -o LINK",
+        f"truth PICTURE {BLUR} --sigma-max 1.4 --n-spo 3 -o LINK",
+        "simulate PICTURE LINK",
+    ],
 )
 def test_output_on_a_link_goes_where_the_link_leads(picture, tmp_path, command):
     is_view = command.startswith("simulate")
