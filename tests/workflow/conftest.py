@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,18 +23,40 @@ def snakemake_in_forks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("keystab.provenance.study_folder.subprocess", SimpleNamespace(run=forked))
 
 
+def made_once(
+    tmp_path_factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]
+) -> Path:
+    """A folder that the first process of this test run that asks for it makes for all."""
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent
+    folder, done = shared / name, shared / f"{name}.done"
+    with (shared / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not done.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            make(folder)
+            done.touch()
+    return folder
+
+
 @pytest.fixture(scope="session")
 def ran(tmp_path_factory: pytest.TempPathFactory) -> Study:
-    """A small study that has been run."""
-    study = small_study.write(tmp_path_factory.mktemp("small") / "study")
-    study.run(1)
-    return study
+    """A small study that has been run and packed; tests change copies of it."""
+
+    def make(folder: Path) -> None:
+        study = small_study.write(folder)
+        study.run(1)
+        archive.pack(study)
+
+    return Study(made_once(tmp_path_factory, "small-study", make))
 
 
 @pytest.fixture(scope="session")
 def packed(ran: Study) -> Path:
     """Its archive."""
-    return archive.pack(ran)
+    (path,) = (ran.project / "results/archive").iterdir()
+    return path
 
 
 @pytest.fixture
@@ -43,7 +68,11 @@ def project(tmp_path: Path) -> Project:
 @pytest.fixture(scope="session")
 def touched(tmp_path_factory: pytest.TempPathFactory) -> Project:
     """A copy that Snakemake takes for finished: empty outputs, with all that it remembers."""
-    project = copy_of_project(tmp_path_factory.mktemp("touched") / "project")
+    return Project(made_once(tmp_path_factory, "touched", touch_all))
+
+
+def touch_all(folder: Path) -> None:
+    project = copy_of_project(folder)
     summary = project.snakemake(*QUICK, "--summary").stdout
     outputs = [line.split("\t")[0] for line in summary.splitlines() if line.count("\t") == 5][1:]
     assert len(outputs) > 40
@@ -57,7 +86,6 @@ def touched(tmp_path_factory: pytest.TempPathFactory) -> Project:
             (path / ".snakemake_timestamp").touch()
     run = project.snakemake(*QUICK, "--touch", "--forceall")
     assert run.returncode == 0, run.stdout
-    return project
 
 
 @pytest.fixture

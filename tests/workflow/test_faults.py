@@ -1,10 +1,14 @@
-"""Whatever stops a run, the same command takes it up, and nothing wrong or half-written stays."""
+"""Whatever stops a run, the same command takes it up, and nothing wrong or half-written stays.
+
+Kills are tried on the real study, of which a few jobs run; all else on the small one.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -14,28 +18,51 @@ from pathlib import Path
 
 import psutil
 import pytest
+import small_study
 from project import QUICK, ROOT, Project, copy_of_project
+
+from keystab.provenance.study_folder import Study
 
 STUDY = [sys.executable, str(ROOT / "tools/study.py"), "--cores", "2"]  # what `make study` runs
 TINY = """
 sets: {still: {step: 40}}
 samplings: {n_spo: [3, 4]}
 floor: {settles_at: 4}
-keep_scale_spaces: [3]
+keep_scale_spaces: false
 results: results/tiny
 figures: figures/tiny
 logs: logs/tiny
 """
-FIGURE = "figures/tiny/fig4.png"
-ONE_FIGURE = ("--configfile", "config/tiny.yaml", "--", FIGURE)
+MATCHES = ("--configfile", "config/tiny.yaml", "--", "results/tiny/matches/samplings.parquet")
 EXTREMA = "results/tiny/keypoints/sampling_n3.parquet"
 ONE_TABLE = ("--configfile", "config/tiny.yaml", "--", EXTREMA)
+SMALL_TABLE = "results/tables/fig1.csv"  # of the small study
 
 
 def new_project(folder: Path) -> Project:
     project = copy_of_project(folder, own_library=False)
     (project.folder / "config/tiny.yaml").write_text(TINY)
     return project
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Project:
+    """The small study, of which nothing has been run."""
+    return with_settings_of_the_study(small_study.write(tmp_path / "small").project)
+
+
+@pytest.fixture
+def small_finished(ran: Study, tmp_path: Path) -> Project:
+    """The small study, finished, to be damaged."""
+    return with_settings_of_the_study(shutil.copytree(ran.project, tmp_path / "finished"))
+
+
+def with_settings_of_the_study(folder: Path) -> Project:
+    """Give the small study what `make study` reads besides its rules."""
+    with (folder / "config/config.yaml").open("a") as settings:
+        settings.write("results: results\nlogs: logs\n")
+    shutil.copytree(ROOT / "profiles/default", folder / "profiles/default", dirs_exist_ok=True)
+    return Project(folder, own_library=False)
 
 
 class Run:
@@ -111,8 +138,8 @@ def jobs_in(said: str) -> int:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Project:
     project = new_project(tmp_path_factory.mktemp("undisturbed") / "project")
-    status, said = study(project, *ONE_FIGURE)
-    assert status == 0, said
+    run = project.snakemake(*MATCHES)
+    assert run.returncode == 0, run.stdout
     return project
 
 
@@ -156,7 +183,7 @@ def kill_and_take_up(
 
 
 def test_two_kills(undisturbed, tmp_path):
-    kill_and_take_up(tmp_path, ONE_FIGURE, results(undisturbed), kills=2, longest=3)
+    kill_and_take_up(tmp_path, MATCHES, results(undisturbed), kills=2, longest=3)
 
 
 @pytest.mark.slow
@@ -169,27 +196,29 @@ def test_twenty_kills_of_every_figure_in_draft_form(tmp_path):
     kill_and_take_up(tmp_path, QUICK, results(project), kills=20, longest=longest)
 
 
-def test_two_runs_at_once(tmp_path):
-    project = new_project(tmp_path / "project")
-    with Run(project, *ONE_FIGURE) as first:
-        while not list(project.folder.glob(".snakemake/locks/*output.lock")):
-            assert first.process.poll() is None, first.said
-            time.sleep(0.05)
-        status, said = study(project, *ONE_FIGURE)
+def test_two_runs_at_once(small):
+    wait = "until [ -e go ]; do sleep 0.05; done; "
+    small.edit("Snakefile", 'shell: "python workflow/jobs.py views', f'shell: "{wait}python workflow/jobs.py views')  # fmt: skip
+    with Run(small) as first:
+        first.wait_for_jobs()
+        assert list(small.folder.glob(".snakemake/locks/*output.lock")), first.said
+        status, said = study(small)
         assert status != 0
         last = said.splitlines()[-1]
         assert last.startswith("error: another run is at work here (process "), said
+        (small.folder / "go").touch()
         assert first.process.wait() == 0, first.said
-    assert (project.folder / FIGURE).is_file()
+    assert (small.folder / "figures/fig1.png").is_file()
 
 
-def test_a_run_on_another_machine_keeps_its_lock(again):
-    (again.folder / EXTREMA).unlink()
-    locks = again.folder / ".snakemake/locks"
+def test_a_run_on_another_machine_keeps_its_lock(small_finished):
+    folder = small_finished.folder
+    (folder / SMALL_TABLE).unlink()
+    locks = folder / ".snakemake/locks"
     locks.mkdir(exist_ok=True)
-    (locks / "0.output.lock").write_text(f"{EXTREMA}\n")
-    (again.folder / ".snakemake/host").write_text("elsewhere")
-    status, said = study(again, *ONE_TABLE)
+    (locks / "0.output.lock").write_text(f"{SMALL_TABLE}\n")
+    (folder / ".snakemake/host").write_text("elsewhere")
+    status, said = study(small_finished, "--", SMALL_TABLE)
     assert status != 0
     assert "error: a run on elsewhere holds the lock of this folder" in said.splitlines()[-1]
     assert list(locks.iterdir())
@@ -248,40 +277,41 @@ def in_own_mounts(
     return run
 
 
-def test_a_full_disk_is_named_and_the_rest_is_done_when_there_is_room(undisturbed, tmp_path):
-    project = new_project(tmp_path / "project")
-    project.edit("config/tiny.yaml", "keep_scale_spaces: [3]", "keep_scale_spaces: false")
+def test_a_full_disk_is_named_and_the_rest_is_done_when_there_is_room(small, ran):
+    tables = f"{SMALL_TABLE} results/tables/figS3.csv"
     run = in_own_mounts(
-        project,
-        """
+        small,
+        f"""
         mkdir results
-        mount -t tmpfs -o size=160k tmpfs results
-        "$@" && exit 3
-        echo ROOM
+        mount -t tmpfs -o size=1m tmpfs results
+        "$@" -- {tables}
+        cat /dev/zero >results/filler 2>/dev/null || true
+        echo FULL
+        "$@" --keep-going && exit 3
         find results -name '.part-*'
-        mount -o remount,size=20m results
+        echo ROOM
+        rm results/filler
         "$@"
         cp -r results kept
         """,
-        *ONE_FIGURE,
     )
     assert run.returncode == 0, run.stdout
-    full, room = run.stdout.split("ROOM\n")
-    assert "No space left on device" in full.split("Stopped by\n")[1]
-    assert "Traceback" not in full
-    n_jobs = 5  # of the figure, without a stored scale-space
-    assert jobs_in(full) >= 1 and jobs_in(full) + jobs_in(room) == n_jobs
-    assert not room.startswith("results/")
-    for name in ("tables/fig4_counts.csv", "matches/samplings.parquet"):
-        kept, expected = project.folder / "kept/tiny", undisturbed.folder / "results/tiny"
-        assert (kept / name).read_bytes() == (expected / name).read_bytes()
+    before, full, room = re.split("FULL\n|ROOM\n", run.stdout)
+    (line,) = full.split("Stopped by\n")[1].splitlines()[:1]
+    assert re.fullmatch(r"error: results/claims\.\w+: No space left on device", line), full
+    assert "Traceback" not in full and "results/.part" not in full
+    # Two tables of four jobs; two figures; verdicts, the list of digests, and the rule of all.
+    assert [jobs_in(said) for said in (before, full, room)] == [4, 2, 3]
+    for name in ("claims.csv", "claims.md", "tables/fig1.csv"):
+        kept, expected = small.folder / "kept" / name, ran.project / "results" / name
+        assert kept.read_bytes() == expected.read_bytes()
 
 
-def test_a_read_only_folder_of_results_is_named(again):
-    expected = results(again)
-    (again.folder / EXTREMA).unlink()
+def test_a_read_only_folder_of_results_is_named(small_finished):
+    expected = results(small_finished)
+    (small_finished.folder / SMALL_TABLE).unlink()
     run = in_own_mounts(
-        again,
+        small_finished,
         """
         mount --bind results results
         mount -o remount,bind,ro results
@@ -290,9 +320,9 @@ def test_a_read_only_folder_of_results_is_named(again):
         mount -o remount,bind,rw results
         "$@"
         """,
-        *ONE_TABLE,
+        *("--", SMALL_TABLE),
     )
     assert run.returncode == 0, run.stdout
     (line,) = run.stdout.split("WRITABLE\n")[0].splitlines()
-    assert line.startswith("error: results/tiny cannot be written to: mend that")
-    assert results(again) == expected
+    assert line.startswith("error: results cannot be written to: mend that")
+    assert results(small_finished) == expected
