@@ -6,7 +6,7 @@ import os
 import time
 
 import pytest
-from project import QUICK
+from project import QUICK, Project
 
 from keystab.study import plan
 
@@ -155,6 +155,7 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("sets: {examples: {rotation: 112}}", {"simulate", "describe_views", "fig2"}),
     ],
 )  # fmt: skip
-def test_changes_of_settings(finished, setting, expected):
-    (finished.folder / "config/change.yaml").write_text(setting + "\n")
-    assert reruns(finished, "config/change.yaml") - {"claims"} == expected
+def test_changes_of_settings(touched, tmp_path, setting, expected):
+    (tmp_path / "change.yaml").write_text(setting + "\n")
+    project = Project(touched.folder, own_library=False)  # the same code: digested once for all
+    assert reruns(project, str(tmp_path / "change.yaml")) - {"claims"} == expected
