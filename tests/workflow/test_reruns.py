@@ -78,7 +78,7 @@ def test_edits_without_effect(finished):
     for name, old, new in NO_EFFECT:
         finished.edit(name, old, new)
     (finished.folder / "config/change.yaml").write_text("comparison: {border: 3}\n")  # 3.0
-    assert reruns(finished, "config/change.yaml") == set()
+    assert reruns(Project(finished.folder), "config/change.yaml") == set()
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_edits_of_code(finished, name, old, new, expected):
             "from __future__ import annotations\nMORE = 1",
         )
     finished.edit(name, old, new)
-    assert reruns(finished) - {"claims"} == expected
+    assert reruns(Project(finished.folder)) - {"claims"} == expected
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_edits_of_code(finished, name, old, new, expected):
 )
 def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old, new):
     finished.edit(name, old, new)
-    assert reruns(finished) == {"claims"}
+    assert reruns(Project(finished.folder)) == {"claims"}
 
 
 @pytest.mark.parametrize(
