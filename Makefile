@@ -45,7 +45,7 @@ why: environment ## What would run, why, and for how long (TARGET=figures/fig5.p
 	@python tools/why.py $(TARGET) $(OVERLAY)
 
 test: environment ## All tests
-	pytest -n 2 -m "not slow"
+	pytest -n 2 --dist loadfile -m "not slow"
 
 test-slow: environment ## The tests that take minutes: twenty kills of the draft, a cluster
 	pytest -m slow

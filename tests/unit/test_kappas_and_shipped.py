@@ -21,7 +21,7 @@ KAPPAS = [2 ** (1 / 30), 2 ** (1 / 6), 2**0.5]
 
 def test_one_blob_is_one_keypoint_whatever_the_ratio():
     size, blur = 1.6, 0.9
-    image = blob((49, 53), (24.0, 26.0), math.hypot(size, blur))
+    image = blob((35, 39), (17.0, 19.0), math.hypot(size, blur))
     parts = []
     for kappa in KAPPAS:
         found = refined_keypoints(*detect_in_view(image, Detector(blur, 15, kappa=kappa)), 0.6, 2)

@@ -140,9 +140,14 @@ def picture():
     return 0.5 + 0.1 * sum(blurred)
 
 
-def test_exchanged_axes_change_nothing(picture):
+@pytest.fixture(scope="module")
+def seen(picture):
+    return described(picture)
+
+
+def test_exchanged_axes_change_nothing(picture, seen):
     # The detector's grid begins at the first pixel, so that turns would move it.
-    here, before = described(picture)
+    here, before = seen
     there, after = described(picture.T)
     order = [
         np.lexsort((t["sigma"], t[b], t[a])) for t, a, b in ((here, "y", "x"), (there, "x", "y"))
@@ -157,8 +162,8 @@ def test_exchanged_axes_change_nothing(picture):
         )
 
 
-def test_surroundings_turn_with_the_picture(picture):
-    found, _ = described(picture)
+def test_surroundings_turn_with_the_picture(picture, seen):
+    found, _ = seen
     places = found[["sigma", "y", "x"]].to_numpy()
     turned = np.stack([places[:, 0], picture.shape[1] - 1 - places[:, 2], places[:, 1]], axis=1)
     sign = found["sign"].to_numpy(dtype=float)
@@ -170,8 +175,8 @@ def test_surroundings_turn_with_the_picture(picture):
 
 
 @pytest.mark.parametrize("gain", [0.25, -0.5])
-def test_contrast_changes_nothing_that_models_see(picture, gain):
-    _, before = described(picture)
+def test_contrast_changes_nothing_that_models_see(picture, seen, gain):
+    _, before = seen
     here, after = described(0.5 + gain * picture)
     same = [
         name for name in PREDICTORS if name not in ("dog", "difference", "laplacian", "eigenvalue")
@@ -180,13 +185,13 @@ def test_contrast_changes_nothing_that_models_see(picture, gain):
     for name in ("dog", "difference", "laplacian", "eigenvalue"):
         np.testing.assert_allclose(abs(gain) * before[name], after[name], rtol=1e-6)
     groups = pd.DataFrame({"picture": "one", "n_spo": here["n_spo"]})
-    seen = [model_inputs(table, groups) for table in (before, after)]
-    np.testing.assert_allclose(seen[0], seen[1], rtol=0, atol=1e-5)
+    inputs = [model_inputs(table, groups) for table in (before, after)]
+    np.testing.assert_allclose(inputs[0], inputs[1], rtol=0, atol=1e-5)
 
 
-def test_models_see_nothing_of_the_sampling(picture):
-    _, table = described(picture)
+def test_models_see_nothing_of_the_sampling(seen):
+    _, table = seen
     both = pd.concat([table, 3.0 * table], ignore_index=True)
     groups = pd.DataFrame({"picture": "one", "n_spo": np.repeat([3, 5], len(table))})
-    seen = model_inputs(both, groups)["dog"].to_numpy().reshape(2, -1)
-    np.testing.assert_allclose(seen[0], seen[1], rtol=0, atol=1e-12)
+    inputs = model_inputs(both, groups)["dog"].to_numpy().reshape(2, -1)
+    np.testing.assert_allclose(inputs[0], inputs[1], rtol=0, atol=1e-12)

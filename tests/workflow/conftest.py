@@ -90,6 +90,9 @@ def touch_all(folder: Path) -> None:
 
 @pytest.fixture
 def finished(touched: Project, tmp_path: Path) -> Project:
-    """A fresh copy of the finished project, to be edited."""
+    """A fresh copy of the finished project, to be edited; its code is the original's.
+
+    Where code is edited, `Project(finished.folder)` runs with the copy's.
+    """
     shutil.copytree(touched.folder, tmp_path / "project")
-    return Project(tmp_path / "project")
+    return Project(tmp_path / "project", own_library=False)

@@ -53,6 +53,8 @@ class Project:
         os.chdir(self.folder)
         os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         os.environ["PYTHONPATH"] = str(self.library)
+        if self.library == ROOT / "src":
+            return
         sys.path.insert(0, str(self.library))
         for name in [name for name in sys.modules if name.partition(".")[0] == "keystab"]:
             del sys.modules[name]
@@ -121,8 +123,16 @@ def in_fork(
 
 @functools.cache
 def _import_what_runs_need() -> None:
-    """Import, once for all forks, Snakemake and what it loads when it runs."""
+    """Do once for all forks what each would do: import Snakemake, digest the code of jobs."""
     import snakemake.cli
+
+    import keystab
+    from keystab.provenance.code_digest import fingerprint
+
+    assert Path(keystab.__file__).is_relative_to(ROOT / "src"), "another keystab is tested"
+    for room in ("stages", "figures"):
+        for path in (ROOT / "src/keystab" / room).glob("[!_]*.py"):
+            fingerprint(f"keystab.{room}.{path.stem}")
 
     for name in IMPORTED_LATE:
         importlib.import_module(name)

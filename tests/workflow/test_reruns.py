@@ -6,7 +6,7 @@ import os
 import time
 
 import pytest
-from project import QUICK
+from project import QUICK, Project
 
 from keystab.study import plan
 
@@ -79,7 +79,7 @@ def test_edits_without_effect(finished):
     for name, old, new in NO_EFFECT:
         finished.edit(name, old, new)
     (finished.folder / "config/change.yaml").write_text("comparison: {border: 3}\n")  # 3.0
-    assert reruns(finished, "config/change.yaml") == set()
+    assert reruns(Project(finished.folder), "config/change.yaml") == set()
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_edits_of_code(finished, name, old, new, expected):
             "from __future__ import annotations\nMORE = 1",
         )
     finished.edit(name, old, new)
-    assert reruns(finished) - {"claims"} == expected
+    assert reruns(Project(finished.folder)) - {"claims"} == expected
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_edits_of_code(finished, name, old, new, expected):
 )
 def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old, new):
     finished.edit(name, old, new)
-    assert reruns(finished) == {"claims"}
+    assert reruns(Project(finished.folder)) == {"claims"}
 
 
 @pytest.mark.parametrize(
@@ -158,6 +158,7 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("sets: {examples: {rotation: 112}}", {"simulate", "describe_views", "fig2"}),
     ],
 )  # fmt: skip
-def test_changes_of_settings(finished, setting, expected):
-    (finished.folder / "config/change.yaml").write_text(setting + "\n")
-    assert reruns(finished, "config/change.yaml") - {"claims"} == expected
+def test_changes_of_settings(touched, tmp_path, setting, expected):
+    (tmp_path / "change.yaml").write_text(setting + "\n")
+    project = Project(touched.folder, own_library=False)  # the same code: digested once for all
+    assert reruns(project, str(tmp_path / "change.yaml")) - {"claims"} == expected

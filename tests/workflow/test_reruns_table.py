@@ -6,7 +6,7 @@ import re
 import runpy
 
 import pytest
-from project import ROOT
+from project import ROOT, Project
 
 TOOL = runpy.run_path(str(ROOT / "tools/reruns.py"))
 WHY = runpy.run_path(str(ROOT / "tools/why.py"))
@@ -143,7 +143,8 @@ def test_why_says_what_changed_and_what_follows(finished):
     finished.edit(
         "src/keystab/evaluation/roc.py", "import annotations", "import annotations\nMORE = 1"
     )
-    _, said = finished.dry_run("--configfile", "config/quick.yaml", "--", "figures/quick/fig5.pdf")
+    edited = Project(finished.folder)
+    _, said = edited.dry_run("--configfile", "config/quick.yaml", "--", "figures/quick/fig5.pdf")
     lines = list(WHY["in_lines"](WHY["jobs_and_reasons"](said), TOOL["Clock"]([], {})))
     assert lines[1] == "Because code of keystab.stages.score_features changed:"
 

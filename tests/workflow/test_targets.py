@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import re
 import runpy
-from pathlib import Path
 
 import pytest
 from project import QUICK, ROOT
@@ -15,7 +14,6 @@ from keystab.study.plan import FIGURES
 
 PICTURES = sorted((ROOT / "config/pictures").glob("*.yaml"))
 LEDGER = f"{','.join(FIELDS)}\none,,,,,,,,,reproduced,\n"
-RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
 
 
 def test_whole_study_at_the_papers_settings(project):
@@ -156,9 +154,3 @@ def test_parameters_are_compared_with_their_names(jobs):
     # Plain values would be compared as a set, without names; see Named.
     for job in jobs:
         assert all(re.match(r"(code of )?[\w.]+ = ", text) for text in job.params), job
-
-
-@pytest.mark.parametrize("path", RULES, ids=lambda path: path.name)
-def test_every_file_of_rules_says_what_comes_in_and_what_goes_out(path: Path):
-    text = path.read_text()
-    assert text.startswith('"""') and "Comes in:" in text and "Goes out:" in text
