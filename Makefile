@@ -2,13 +2,26 @@
 # or stale; PYTHON=... says with which Python.
 
 SHELL := /bin/bash
-CORES ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
+# nproc would say what OMP_NUM_THREADS holds.
+CORES ?= $(shell env -u OMP_NUM_THREADS -u OMP_THREAD_LIMIT nproc 2>/dev/null || \
+    getconf _NPROCESSORS_ONLN)
 WITH ?=
 ARCHIVE ?=
 RECOMPUTE ?=
 
+# What a person's own variables say to the shell, Python, pip and Snakemake is for other projects:
+# with them another library, other packages or other settings would be taken.
+unexport CDPATH BASH_ENV ENV PYTHONPATH PYTHONHOME PYTHONSTARTUP PYTHONUSERBASE PYTHONPLATLIBDIR \
+    PYTHONWARNINGS PYTHONOPTIMIZE PYTHONSAFEPATH PYTHONINSPECT PYTHONCASEOK PYTHONEXECUTABLE \
+    PYTHONUTF8 PYTHONIOENCODING VIRTUAL_ENV
+export PYTHONNOUSERSITE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
-SNAKEMAKE = $(NO_CORES)python tools/study.py --cores $(CORES)
+
+# One run of Snakemake at a time works in a folder; each has as many jobs as CORES says.
+.NOTPARALLEL:
+
+SNAKEMAKE = $(NO_CORES)python tools/study.py --cores $(CORES) $(EXECUTOR)
+EXECUTOR = $(if $(filter command,$(origin PROFILE)),--profile '$(PROFILE)')
 NO_CORES = $(if $(filter 0,$(CORES)),$(error CORES is 0, and Snakemake would wait for ever: give \
     the number of jobs at a time, at least 1))
 OVERLAY = $(if $(WITH),--configfile $(WITH))

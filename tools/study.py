@@ -170,8 +170,19 @@ def main(arguments: list[str]) -> int:
     from interrupted import take_up, why_locked  # beside this file
 
     take_up(Path.cwd(), functools.partial(print, flush=True))
-    snakemake = [sys.executable, "-m", "snakemake"]
-    plan = subprocess.run([*snakemake, "--dry-run", *arguments], capture_output=True, text=True)
+    from keystab.provenance.shielded_environment import shielded
+
+    profile = os.environ.get("SNAKEMAKE_PROFILE", "none")
+    if profile != "none" and "--profile" not in arguments:
+        print(
+            f"SNAKEMAKE_PROFILE={profile} is not used here, so that results do not depend on it; "
+            f"for its executor: make study PROFILE={profile}",
+            file=sys.stderr,
+        )
+    snakemake, variables = [sys.executable, "-m", "snakemake"], shielded()
+    plan = subprocess.run(
+        [*snakemake, "--dry-run", *arguments], capture_output=True, text=True, env=variables
+    )
     said = plan.stdout + plan.stderr
     planned = jobs_of(said)
     if (planned or "Write-protected output" in said) and (folders := not_writable(arguments)):
@@ -182,7 +193,7 @@ def main(arguments: list[str]) -> int:
         )
         return 2
     if plan.returncode:  # says what is wrong
-        return subprocess.run([*snakemake, *arguments]).returncode
+        return subprocess.run([*snakemake, *arguments], env=variables).returncode
     clock = Clock(planned, read_durations())
     began: dict[str, tuple[str, float]] = {}
     taken: dict[str, float] = {}
@@ -195,6 +206,7 @@ def main(arguments: list[str]) -> int:
         stderr=subprocess.STDOUT,
         text=True,
         bufsize=1,
+        env=variables,
     ) as run:
         assert run.stdout is not None
         try:

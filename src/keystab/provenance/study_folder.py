@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import os
 import re
 import subprocess
 import sys
@@ -15,7 +14,7 @@ from pathlib import Path
 import yaml
 
 from keystab.errors import InputError
-from keystab.provenance.code_digest import folder_of_loops
+from keystab.provenance.shielded_environment import shielded
 from keystab.study.settings import Settings, checked, read_yaml
 
 __all__ = ["Output", "Study", "find_project", "jobs_and_reasons", "settings_digest"]
@@ -153,7 +152,9 @@ class Study:
             If a job fails.
         """
         arguments = [*self._command(), "--cores", str(cores), *self._files(), "--", *targets]
-        status = subprocess.run(arguments, cwd=self.project, env=_environment(self.home)).returncode
+        status = subprocess.run(
+            arguments, cwd=self.project, env=shielded(home=self.home)
+        ).returncode
         if status:
             raise InputError("the study stopped before its end; the reason stands above")
 
@@ -172,7 +173,7 @@ class Study:
             run = subprocess.run(
                 command,
                 cwd=self.project,
-                env=_environment(self.home),
+                env=shielded(home=self.home),
                 capture_output=True,
                 encoding="utf-8",
                 errors="replace",
@@ -220,18 +221,3 @@ def find_project(start: Path | None = None) -> Path:
         if (folder / "Snakefile").is_file() and (folder / "environment.lock").is_file():
             return folder
     raise InputError(f"{start} lies in no copy of the project; go to the project's folder")
-
-
-def _environment(home: Path | None) -> dict[str, str]:
-    """Variables under which Snakemake, and the jobs that it starts, find this very library."""
-    of_user = {} if home is None else {"HOME": str(home), "XDG_CACHE_HOME": str(home / ".cache")}
-    library = Path(__file__).parents[2]
-    paths = [str(Path(sys.executable).parent), os.environ.get("PATH", "")]
-    return {
-        "NUMBA_CACHE_DIR": str(folder_of_loops(library.parent)),
-        **os.environ,
-        **of_user,
-        "PYTHONSAFEPATH": "1",  # no module is taken from the folder in which Snakemake runs
-        "PYTHONPATH": str(library),
-        "PATH": os.pathsep.join(paths),
-    }
