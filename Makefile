@@ -46,10 +46,10 @@ quick: environment ## Every figure in draft form, in some minutes
 	$(NO_WITH)$(SNAKEMAKE) $(QUICK)
 
 figures/quick/% results/quick/%: environment FORCE
-	$(NO_WITH)$(SNAKEMAKE) $@ $(QUICK)
+	$(NO_WITH)$(SNAKEMAKE) '$@' $(QUICK)
 
 figures/% results/%: environment FORCE
-	$(SNAKEMAKE) $@ $(OVERLAY)
+	$(SNAKEMAKE) '$@' $(OVERLAY)
 
 report: study ## One HTML file with figures, verdicts, costs and provenance, after the study
 	python tools/report.py $(OVERLAY)

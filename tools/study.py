@@ -114,10 +114,11 @@ def config_files(arguments: list[str]) -> list[str]:
 
 def not_writable(arguments: list[str]) -> list[str]:
     """Folders of the settings in which nothing can be written."""
+    from keystab.study.result_folders import FOLDERS, normal_folder
     from keystab.study.settings import read_yaml
 
     settings = read_yaml("config/config.yaml", *config_files(arguments))
-    folders = [".snakemake", *(str(settings[key]) for key in ("results", "figures", "logs"))]
+    folders = [".snakemake", *(normal_folder(str(settings[key])) for key in FOLDERS)]
     return [folder for folder in folders if not os.access(existing(Path(folder)), os.W_OK)]
 
 
@@ -131,7 +132,7 @@ def wrong_file(arguments: list[str]) -> str:
     from keystab.errors import InputError
     from keystab.study.settings import read_yaml
 
-    for name in config_files(arguments):
+    for name in ("config/config.yaml", *config_files(arguments)):
         if not Path(name).is_file():
             return f"{name}: no such file of settings; check WITH="
         try:

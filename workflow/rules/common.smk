@@ -22,6 +22,8 @@ from keystab.study.claims import read_claims, table_names
 from keystab.study.rule_parameters import Rules
 
 try:
+    # Snakemake has merged these; what it dropped or misread without a word is refused here.
+    settings.read_yaml(Path(workflow.basedir, "config/config.yaml"), *workflow.overwrite_configfiles)
     config.update(
         settings.checked(
             config,

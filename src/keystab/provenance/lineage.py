@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shlex
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-
-import yaml
 
 from keystab.errors import InputError
 from keystab.io.figure_metadata import PNG_KEY, FigureMetadata
 from keystab.provenance.code_digest import fingerprint
 from keystab.provenance.snakemake_records import Record, read_records, settings_behind, upstream
+from keystab.study.result_folders import normal_folder
+from keystab.study.settings import read_yaml
 
 __all__ = ["code_of_figure", "file_digest", "printable", "read_figure_metadata", "whence"]
 
@@ -248,9 +249,10 @@ def _state(path: Path, digest: str) -> str:
 def _commands(output: str, project: Path) -> Iterator[str]:
     """Commands that make a figure, with the settings whose figures go to its folder."""
     folder = Path(output).parent.as_posix()
-    yield f"make {output}{_overlay(folder, project, ' WITH=', 'make')}"
+    quoted = shlex.quote(output)
+    yield f"make {quoted}{_overlay(folder, project, ' WITH=', 'make')}"
     overlay = _overlay(folder, project, " --configfile ", "snakemake")
-    yield f"or, after `. .venv/bin/activate`: snakemake {output} -j2{overlay}"
+    yield f"or, after `. .venv/bin/activate`: snakemake {quoted} -j2{overlay}"
 
 
 def _overlay(folder: str, project: Path, flag: str, tool: str) -> str:
@@ -258,10 +260,10 @@ def _overlay(folder: str, project: Path, flag: str, tool: str) -> str:
     files = sorted(project.glob("config/**/*.yaml"))
     for file in files:
         try:
-            given = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except (OSError, yaml.YAMLError):
+            figures = read_yaml(file).get("figures")
+        except InputError:  # not of this figure, whatever else it is
             continue
-        if isinstance(given, dict) and given.get("figures") == folder:
+        if isinstance(figures, str) and normal_folder(figures, project) == folder:
             name = file.relative_to(project).as_posix()
             known = name == "config/config.yaml" or (tool == "make" and folder == "figures/quick")
             return "" if known else f"{flag}{name}"
