@@ -12,6 +12,7 @@ from pathlib import Path
 from keystab.errors import InputError
 from keystab.io.figure_metadata import PNG_KEY, FigureMetadata
 from keystab.provenance.code_digest import fingerprint
+from keystab.provenance.imported_software import software_digest, software_problems
 from keystab.provenance.snakemake_records import Record, read_records, settings_behind, upstream
 from keystab.study.result_folders import normal_folder
 from keystab.study.settings import read_yaml
@@ -200,12 +201,14 @@ def _told(path: Path, project: Path) -> list[str]:
 def _identity(metadata: FigureMetadata, project: Path) -> Iterator[str]:
     """What its metadata say about code, software and settings, and whether it is so here."""
     here = code_of_figure(metadata.figure)
-    lock = file_digest(project / "environment.lock")
+    lock = software_digest(project / "environment.lock")
     for name, given, now in (("code", metadata.code, here), ("lock", metadata.lock, lock)):
         if given is None:
             yield f"{name:<8} not said: it was drawn by hand"
         else:
             yield f"{name:<8} {given}  {'as it is here' if given == now else 'not as it is here'}"
+    for problem in software_problems(project / "environment.lock"):
+        yield f"         here, {problem}"
     own = ", ".join(f"{name} = {value}" for name, value in sorted(metadata.settings.items()))
     yield f"config   {metadata.config}  of its tables and of {own}"
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import yaml
 
 from keystab.errors import InputError
+from keystab.provenance.imported_software import software_digest
 from keystab.provenance.shielded_environment import shielded
 from keystab.study.settings import Settings, checked, read_yaml
 
@@ -86,8 +87,8 @@ class Study:
 
     @property
     def lock_digest(self) -> str:
-        """SHA-256 of ``environment.lock``."""
-        return hashlib.sha256((self.project / "environment.lock").read_bytes()).hexdigest()
+        """SHA-256 of ``environment.lock``, if that is what is imported; see `software_digest`."""
+        return software_digest(self.project / "environment.lock")
 
     def outputs(self) -> list[Output]:
         """Every file that the study makes, sorted by path; nothing is run.
