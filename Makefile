@@ -20,8 +20,10 @@ export PATH := $(CURDIR)/.venv/bin:$(PATH)
 # One run of Snakemake at a time works in a folder; each has as many jobs as CORES says.
 .NOTPARALLEL:
 
-SNAKEMAKE = $(NO_CORES)python tools/study.py --cores $(CORES) $(EXECUTOR)
-EXECUTOR = $(if $(filter command,$(origin PROFILE)),--profile '$(PROFILE)')
+SNAKEMAKE = $(NO_CORES)python tools/study.py $(EXECUTOR)
+# A profile says itself how many jobs or cores its cluster takes, unless CORES is typed as well.
+EXECUTOR = $(if $(filter command,$(origin PROFILE)),--profile '$(PROFILE)' $(if \
+    $(filter command,$(origin CORES)),--cores $(CORES)),--cores $(CORES))
 NO_CORES = $(if $(filter 0,$(CORES)),$(error CORES is 0, and Snakemake would wait for ever: give \
     the number of jobs at a time, at least 1))
 OVERLAY = $(if $(WITH),--configfile $(WITH))

@@ -80,4 +80,5 @@ def test_what_python_is_told_for_other_projects_is_left_out(checkout):
 
 def test_a_profile_is_taken_where_it_is_asked_for(checkout):
     run(checkout, "make", "study", "PROFILE=profiles/slurm")
-    assert "|--profile|profiles/slurm|" in (checkout / "said").read_text()
+    said = (checkout / "said").read_text()
+    assert "|--profile|profiles/slurm|" in said and "--cores" not in said
