@@ -2,13 +2,28 @@
 # or stale; PYTHON=... says with which Python.
 
 SHELL := /bin/bash
-CORES ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
+# nproc would say what OMP_NUM_THREADS holds.
+CORES ?= $(shell env -u OMP_NUM_THREADS -u OMP_THREAD_LIMIT nproc 2>/dev/null || \
+    getconf _NPROCESSORS_ONLN)
 WITH ?=
 ARCHIVE ?=
 RECOMPUTE ?=
 
+# What a person's own variables say to the shell, Python, pip and Snakemake is for other projects:
+# with them another library, other packages or other settings would be taken.
+unexport CDPATH BASH_ENV ENV PYTHONPATH PYTHONHOME PYTHONSTARTUP PYTHONUSERBASE PYTHONPLATLIBDIR \
+    PYTHONWARNINGS PYTHONOPTIMIZE PYTHONSAFEPATH PYTHONINSPECT PYTHONCASEOK PYTHONEXECUTABLE \
+    PYTHONUTF8 PYTHONIOENCODING VIRTUAL_ENV
+export PYTHONNOUSERSITE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
-SNAKEMAKE = $(NO_CORES)python tools/study.py --cores $(CORES)
+
+# One run of Snakemake at a time works in a folder; each has as many jobs as CORES says.
+.NOTPARALLEL:
+
+SNAKEMAKE = $(NO_CORES)python tools/study.py $(EXECUTOR)
+# A profile says itself how many jobs or cores its cluster takes, unless CORES is typed as well.
+EXECUTOR = $(if $(filter command,$(origin PROFILE)),--profile '$(PROFILE)' $(if \
+    $(filter command,$(origin CORES)),--cores $(CORES)),--cores $(CORES))
 NO_CORES = $(if $(filter 0,$(CORES)),$(error CORES is 0, and Snakemake would wait for ever: give \
     the number of jobs at a time, at least 1))
 OVERLAY = $(if $(WITH),--configfile $(WITH))
@@ -33,10 +48,10 @@ quick: environment ## Every figure in draft form, in some minutes
 	$(NO_WITH)$(SNAKEMAKE) $(QUICK)
 
 figures/quick/% results/quick/%: environment FORCE
-	$(NO_WITH)$(SNAKEMAKE) $@ $(QUICK)
+	$(NO_WITH)$(SNAKEMAKE) '$@' $(QUICK)
 
 figures/% results/%: environment FORCE
-	$(SNAKEMAKE) $@ $(OVERLAY)
+	$(SNAKEMAKE) '$@' $(OVERLAY)
 
 report: study ## One HTML file with figures, verdicts, costs and provenance, after the study
 	python tools/report.py $(OVERLAY)

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import yaml
 
+from keystab.provenance.shielded_environment import shielded
 from keystab.study.plan import FIGURES
 
 ROOT = Path(__file__).parents[1]
@@ -34,9 +35,8 @@ TARGETS = {
 
 def jobs_and_files(targets: list[str], logs: str) -> tuple[set[Path], set[Path]]:
     """Benchmark records of the jobs that the targets need, and all files that these write."""
-    run = subprocess.run(
-        ["snakemake", "--summary", *targets], cwd=ROOT, capture_output=True, text=True
-    )
+    command = [sys.executable, "-m", "snakemake", "--summary", *targets]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=shielded())
     lines = run.stdout.splitlines()
     if run.returncode or not lines:
         sys.exit(run.stderr or "error: snakemake --summary says nothing")

@@ -9,6 +9,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+from keystab.provenance.shielded_environment import shielded
+
 NOT_TAKEN = "Specify a conda environment or container for each rule."
 
 
@@ -25,7 +27,8 @@ def advice(report: str) -> list[str]:
 
 def main() -> int:
     """Return 0 where nothing is left, else 1."""
-    run = subprocess.run(["snakemake", "--lint"], capture_output=True, text=True)
+    command = [sys.executable, "-m", "snakemake", "--lint"]
+    run = subprocess.run(command, capture_output=True, text=True, env=shielded())
     report = run.stdout + run.stderr
     found = advice(report)
     if run.returncode and not found:  # not a report but an error

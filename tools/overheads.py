@@ -1,7 +1,7 @@
 """Say what share of the time of the study's jobs starts them, reads and writes.
 
 PYTHONPROFILEIMPORTTIME=1 make study && python tools/overheads.py
-PYTHONPATH=tools/profiled PROFILES=logs/profiles make study && python tools/overheads.py
+PYTHONPATH=tools/profiled PROFILES=logs/profiles snakemake -j2 && python tools/overheads.py
 
 After the first, Python has written into the log of every job how long each import took; what a job
 takes in all is in its benchmark record. After the second, every job has left a profile, in which

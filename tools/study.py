@@ -114,10 +114,11 @@ def config_files(arguments: list[str]) -> list[str]:
 
 def not_writable(arguments: list[str]) -> list[str]:
     """Folders of the settings in which nothing can be written."""
+    from keystab.study.result_folders import FOLDERS, normal_folder
     from keystab.study.settings import read_yaml
 
     settings = read_yaml("config/config.yaml", *config_files(arguments))
-    folders = [".snakemake", *(str(settings[key]) for key in ("results", "figures", "logs"))]
+    folders = [".snakemake", *(normal_folder(str(settings[key])) for key in FOLDERS)]
     return [folder for folder in folders if not os.access(existing(Path(folder)), os.W_OK)]
 
 
@@ -131,7 +132,7 @@ def wrong_file(arguments: list[str]) -> str:
     from keystab.errors import InputError
     from keystab.study.settings import read_yaml
 
-    for name in config_files(arguments):
+    for name in ("config/config.yaml", *config_files(arguments)):
         if not Path(name).is_file():
             return f"{name}: no such file of settings; check WITH="
         try:
@@ -170,8 +171,19 @@ def main(arguments: list[str]) -> int:
     from interrupted import take_up, why_locked  # beside this file
 
     take_up(Path.cwd(), functools.partial(print, flush=True))
-    snakemake = [sys.executable, "-m", "snakemake"]
-    plan = subprocess.run([*snakemake, "--dry-run", *arguments], capture_output=True, text=True)
+    from keystab.provenance.shielded_environment import shielded
+
+    profile = os.environ.get("SNAKEMAKE_PROFILE", "none")
+    if profile != "none" and "--profile" not in arguments:
+        print(
+            f"SNAKEMAKE_PROFILE={profile} is not used here, so that results do not depend on it; "
+            f"for its executor: make study PROFILE={profile}",
+            file=sys.stderr,
+        )
+    snakemake, variables = [sys.executable, "-m", "snakemake"], shielded()
+    plan = subprocess.run(
+        [*snakemake, "--dry-run", *arguments], capture_output=True, text=True, env=variables
+    )
     said = plan.stdout + plan.stderr
     planned = jobs_of(said)
     if (planned or "Write-protected output" in said) and (folders := not_writable(arguments)):
@@ -182,7 +194,7 @@ def main(arguments: list[str]) -> int:
         )
         return 2
     if plan.returncode:  # says what is wrong
-        return subprocess.run([*snakemake, *arguments]).returncode
+        return subprocess.run([*snakemake, *arguments], env=variables).returncode
     clock = Clock(planned, read_durations())
     began: dict[str, tuple[str, float]] = {}
     taken: dict[str, float] = {}
@@ -195,6 +207,7 @@ def main(arguments: list[str]) -> int:
         stderr=subprocess.STDOUT,
         text=True,
         bufsize=1,
+        env=variables,
     ) as run:
         assert run.stdout is not None
         try:

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from keystab.provenance.shielded_environment import shielded
 from keystab.provenance.study_folder import jobs_and_reasons
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -110,7 +111,9 @@ def main(arguments: list[str]) -> int:
         print(f"error: {wrong}", file=sys.stderr)
         return 2
     command = [sys.executable, "-m", "snakemake", "--dry-run", *arguments]
-    run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    run = subprocess.run(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=shielded()
+    )
     if run.returncode:
         print(run.stdout, end="")
         return run.returncode

@@ -66,7 +66,7 @@ def test_whatever_is_given_is_settings_or_refused_in_one_line(data):
         ("a: &b 1", "refers to parts of itself"),
         ("a: " + "1:" * 900 + "1.5", "not plain YAML"),
         ("a: " + "9" * 5000, "not plain YAML"),
-        ("a: 2001-99-99", "not plain YAML"),
+        ("a: 2001-99-99", "as a date"),
         ("a: " + "[" * 3000, "nested too deeply"),
         ("a: [" + "1," * 2001 + "]", "too many values"),
         ("- a", "holds no settings"),

@@ -16,12 +16,16 @@ import yaml
 
 from keystab import parameters
 from keystab.errors import InputError
-from keystab.provenance import code_digest
+from keystab.provenance import code_digest, imported_software
 from keystab.study import claims_by_scene, feasibility, job_resources, plan, scenes, settings
 from keystab.study.claims import read_claims, table_names
 from keystab.study.rule_parameters import Rules
 
 try:
+    # Snakemake has merged these; what it dropped or misread without a word is refused here.
+    settings.read_yaml(
+        Path(workflow.basedir, "config/config.yaml"), *workflow.overwrite_configfiles
+    )
     config.update(
         settings.checked(
             config,
@@ -56,18 +60,21 @@ wildcard_constraints:
 
 
 # Snakemake does not see a change of installed packages; a parameter that changes with the lock
-# file tells it.
+# file, or with what is imported instead of what it says, tells it.
 RULES = Rules(
     RESULTS,
     SCENES,
     code_digest.fingerprint,
-    software=hashlib.sha256(Path(workflow.basedir, "environment.lock").read_bytes()).hexdigest(),
+    software=imported_software.software_digest(Path(workflow.basedir, "environment.lock")),
 )
 of, column, files, placed = RULES.of, RULES.column, RULES.files, RULES.placed
 stage, setting, parameter, growing = RULES.stage, RULES.setting, RULES.parameter, RULES.growing
 
 # Compiled loops are kept with the other things that can be made again, and shared by all jobs.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(code_digest.folder_of_loops(Path.cwd())))
+
+# No module of a job is taken from the folder in which Snakemake runs.
+os.environ.update(PYTHONSAFEPATH="1")
 
 # Jobs use the Python that runs Snakemake, also where its environment was not activated.
 os.environ.update(PATH=os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()]))

@@ -20,6 +20,7 @@ from keystab.errors import InputError
 from keystab.provenance.study_folder import settings_digest
 from keystab.provenance.unpacking import Unpacked
 from keystab.study.feasibility import every_set
+from keystab.study.plain_yaml import plain_yaml
 from keystab.study.settings import Settings, checked, merge, read_yaml
 
 __all__ = [
@@ -214,7 +215,7 @@ def plain_settings(data: bytes, name: str) -> Settings:
             depth -= isinstance(event, yaml.CollectionEndEvent)
             if depth > _MOST_DEPTH or values > _MOST_VALUES:
                 raise InputError(f"{name}: too many values, or nested too deeply for settings")
-        given = yaml.load(text, Loader=loader) or {}
+        given = plain_yaml(text, name) or {}
     except InputError:
         raise
     except (ValueError, ArithmeticError, RecursionError, yaml.YAMLError):

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shlex
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-import yaml
-
 from keystab.errors import InputError
 from keystab.io.figure_metadata import PNG_KEY, FigureMetadata
 from keystab.provenance.code_digest import fingerprint
+from keystab.provenance.imported_software import software_digest, software_problems
 from keystab.provenance.snakemake_records import Record, read_records, settings_behind, upstream
+from keystab.study.result_folders import normal_folder
+from keystab.study.settings import read_yaml
 
 __all__ = ["code_of_figure", "file_digest", "printable", "read_figure_metadata", "whence"]
 
@@ -199,12 +201,14 @@ def _told(path: Path, project: Path) -> list[str]:
 def _identity(metadata: FigureMetadata, project: Path) -> Iterator[str]:
     """What its metadata say about code, software and settings, and whether it is so here."""
     here = code_of_figure(metadata.figure)
-    lock = file_digest(project / "environment.lock")
+    lock = software_digest(project / "environment.lock")
     for name, given, now in (("code", metadata.code, here), ("lock", metadata.lock, lock)):
         if given is None:
             yield f"{name:<8} not said: it was drawn by hand"
         else:
             yield f"{name:<8} {given}  {'as it is here' if given == now else 'not as it is here'}"
+    for problem in software_problems(project / "environment.lock"):
+        yield f"         here, {problem}"
     own = ", ".join(f"{name} = {value}" for name, value in sorted(metadata.settings.items()))
     yield f"config   {metadata.config}  of its tables and of {own}"
 
@@ -248,9 +252,10 @@ def _state(path: Path, digest: str) -> str:
 def _commands(output: str, project: Path) -> Iterator[str]:
     """Commands that make a figure, with the settings whose figures go to its folder."""
     folder = Path(output).parent.as_posix()
-    yield f"make {output}{_overlay(folder, project, ' WITH=', 'make')}"
+    quoted = shlex.quote(output)
+    yield f"make {quoted}{_overlay(folder, project, ' WITH=', 'make')}"
     overlay = _overlay(folder, project, " --configfile ", "snakemake")
-    yield f"or, after `. .venv/bin/activate`: snakemake {output} -j2{overlay}"
+    yield f"or, after `. .venv/bin/activate`: snakemake {quoted} -j2{overlay}"
 
 
 def _overlay(folder: str, project: Path, flag: str, tool: str) -> str:
@@ -258,10 +263,10 @@ def _overlay(folder: str, project: Path, flag: str, tool: str) -> str:
     files = sorted(project.glob("config/**/*.yaml"))
     for file in files:
         try:
-            given = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except (OSError, yaml.YAMLError):
+            figures = read_yaml(file).get("figures")
+        except InputError:  # not of this figure, whatever else it is
             continue
-        if isinstance(given, dict) and given.get("figures") == folder:
+        if isinstance(figures, str) and normal_folder(figures, project) == folder:
             name = file.relative_to(project).as_posix()
             known = name == "config/config.yaml" or (tool == "make" and folder == "figures/quick")
             return "" if known else f"{flag}{name}"

@@ -11,6 +11,7 @@ from typing import Any, TypeGuard
 
 from keystab._version import __version__
 from keystab.errors import InputError
+from keystab.study.result_folders import folder_problem
 
 __all__ = [
     "ABOUT",
@@ -30,13 +31,6 @@ LEFT_OUT = "left-out.csv"
 LEFT_OUT_COLUMNS = ["path", "bytes", "sha256", "rule"]
 MOST_BYTES_OF_ABOUT = 1_000_000
 
-_OWN = {
-    "snakefile", "makefile", "environment.lock", "pyproject.toml", "archive.md", "license",
-    "benchmarks", "config", "docs", "profiles", "settings", "src", "tests", "tools", "workflow",
-}  # fmt: skip
-"""Names, in small letters, that no folder of results can have: they are the project's own."""
-
-_PART = re.compile(r"\w[\w .+-]*(?<![ .])")
 _DIGEST = re.compile("[0-9a-f]{64}")
 _VERSION = re.compile(r"[\w.+-]{1,30}", re.ASCII)
 _MOST_LETTERS, _MOST_OVERLAYS = 1000, 50
@@ -149,24 +143,6 @@ def about_of(data: bytes, any_version: bool = False) -> About:
 def _is_text(value: Any) -> TypeGuard[str]:
     """Whether something is text as a run says it: short, without what a terminal would obey."""
     return isinstance(value, str) and len(value) <= _MOST_LETTERS and value.isprintable()
-
-
-def folder_problem(text: str) -> str:
-    """Say why a folder cannot be one that a run wrote to; nothing where it can.
-
-    Examples
-    --------
-    >>> folder_problem("results/quick"), folder_problem("a/../workflow")
-    ('', 'is no folder within the project; give names with / between them')
-    >>> folder_problem("Workflow/rules")
-    "is one of the project's own; give another"
-    """
-    parts = text.split("/")
-    if len(text) > 200 or not (text.isprintable() and all(map(_PART.fullmatch, parts))):
-        return "is no folder within the project; give names with / between them"
-    if parts[0].casefold() in _OWN or f"{text.casefold()}/".startswith("results/reference/"):
-        return "is one of the project's own; give another"
-    return ""
 
 
 def arithmetic() -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import os
 import re
 import subprocess
 import sys
@@ -15,7 +14,8 @@ from pathlib import Path
 import yaml
 
 from keystab.errors import InputError
-from keystab.provenance.code_digest import folder_of_loops
+from keystab.provenance.imported_software import software_digest
+from keystab.provenance.shielded_environment import shielded
 from keystab.study.settings import Settings, checked, read_yaml
 
 __all__ = ["Output", "Study", "find_project", "jobs_and_reasons", "settings_digest"]
@@ -87,8 +87,8 @@ class Study:
 
     @property
     def lock_digest(self) -> str:
-        """SHA-256 of ``environment.lock``."""
-        return hashlib.sha256((self.project / "environment.lock").read_bytes()).hexdigest()
+        """SHA-256 of ``environment.lock``, if that is what is imported; see `software_digest`."""
+        return software_digest(self.project / "environment.lock")
 
     def outputs(self) -> list[Output]:
         """Every file that the study makes, sorted by path; nothing is run.
@@ -153,7 +153,9 @@ class Study:
             If a job fails.
         """
         arguments = [*self._command(), "--cores", str(cores), *self._files(), "--", *targets]
-        status = subprocess.run(arguments, cwd=self.project, env=_environment(self.home)).returncode
+        status = subprocess.run(
+            arguments, cwd=self.project, env=shielded(home=self.home)
+        ).returncode
         if status:
             raise InputError("the study stopped before its end; the reason stands above")
 
@@ -172,7 +174,7 @@ class Study:
             run = subprocess.run(
                 command,
                 cwd=self.project,
-                env=_environment(self.home),
+                env=shielded(home=self.home),
                 capture_output=True,
                 encoding="utf-8",
                 errors="replace",
@@ -220,18 +222,3 @@ def find_project(start: Path | None = None) -> Path:
         if (folder / "Snakefile").is_file() and (folder / "environment.lock").is_file():
             return folder
     raise InputError(f"{start} lies in no copy of the project; go to the project's folder")
-
-
-def _environment(home: Path | None) -> dict[str, str]:
-    """Variables under which Snakemake, and the jobs that it starts, find this very library."""
-    of_user = {} if home is None else {"HOME": str(home), "XDG_CACHE_HOME": str(home / ".cache")}
-    library = Path(__file__).parents[2]
-    paths = [str(Path(sys.executable).parent), os.environ.get("PATH", "")]
-    return {
-        "NUMBA_CACHE_DIR": str(folder_of_loops(library.parent)),
-        **os.environ,
-        **of_user,
-        "PYTHONSAFEPATH": "1",  # no module is taken from the folder in which Snakemake runs
-        "PYTHONPATH": str(library),
-        "PATH": os.pathsep.join(paths),
-    }

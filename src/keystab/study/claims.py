@@ -10,13 +10,11 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
-
-import yaml
 
 from keystab.errors import InputError
 from keystab.study.expressions import CALLS, CONSTANTS, names_of
+from keystab.study.plain_yaml import read_plain_yaml
 
 __all__ = ["Claim", "Quantity", "parse_claims", "read_claims", "table_names"]
 
@@ -97,14 +95,7 @@ def read_claims(path: str | os.PathLike[str]) -> list[Claim]:
     InputError
         In one line that names the claim, if anything in it cannot work.
     """
-    try:
-        # The compiled loader is ten times as fast, and every start of Snakemake reads the file.
-        loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-        entries = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=loader)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except yaml.YAMLError as error:
-        raise InputError(f"{path}: is not YAML: {' '.join(str(error).split())[:160]}") from None
+    entries = read_plain_yaml(path)
     try:
         return parse_claims(entries)
     except InputError as error:

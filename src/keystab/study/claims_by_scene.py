@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from keystab.errors import InputError
 from keystab.study import settings
 from keystab.study.claims_report import FIELDS, cell
+from keystab.study.result_folders import normal_folder
 from keystab.study.verdicts import UNTESTED, VERDICTS
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def sources(base: Path | str, overlays: Sequence[Path | str]) -> list[Source]:
     for overlay in overlays:
         given = settings.read_yaml(base, overlay)
         name = re.sub(r"\W+", "_", Path(given["reference"]).stem)
-        source = Source(name, f"{given['results']}/claims.csv", str(overlay))
+        source = Source(name, f"{normal_folder(given['results'])}/claims.csv", str(overlay))
         for other in found:
             for what in ("name", "report"):
                 if getattr(source, what) == getattr(other, what):

@@ -7,7 +7,6 @@ them before anything is computed.
 from __future__ import annotations
 
 import difflib
-import os
 from pathlib import Path
 
 from keystab.camera.view_sets import assumed_blur, expanded, per_view
@@ -15,6 +14,7 @@ from keystab.camera.views import effective_blur
 from keystab.errors import InputError
 from keystab.study.picture_checks import Settings, picture_problems, still_blur
 from keystab.study.plan import FIGURES, kept_n_spo
+from keystab.study.result_folders import path_problems
 from keystab.study.settings import refuse
 
 NEEDED_SETS = ("still", "examples")
@@ -52,9 +52,20 @@ def require(settings: Settings, folder: Path | str = ".") -> None:
     InputError
         With one line per problem.
     """
+    refuse(path_problems(settings, Path(folder)))
+    try:
+        _require(settings, Path(folder))
+    except (ArithmeticError, RecursionError) as error:
+        raise InputError(
+            f"config: the settings lead to numbers that cannot be computed ({error}); "
+            "give values nearer to those of config/config.yaml"
+        ) from None
+
+
+def _require(settings: Settings, folder: Path) -> None:
     refuse(sweep_problems(settings))
     settings = {**settings, "sets": expanded(settings["sets"])}
-    refuse(setting_problems(settings) or picture_problems(settings, Path(folder)))
+    refuse(setting_problems(settings) or picture_problems(settings, folder))
 
 
 def sweep_problems(settings: Settings) -> list[str]:
@@ -150,9 +161,6 @@ def setting_problems(settings: Settings) -> list[str]:
             f"floor.settles_at is {settings['floor']['settles_at']}, allowed is at most "
             f"{max(available)}, the last of samplings.n_spo"
         )
-    folders = [os.path.normpath(settings[key]) for key in ("results", "figures", "logs")]
-    if len(set(folders)) < len(folders):
-        problems.append("results, figures and logs name the same folder; give three")
     return problems
 
 

@@ -18,6 +18,8 @@ import jsonschema
 import yaml
 
 from keystab.errors import InputError
+from keystab.study.plain_yaml import read_plain_yaml
+from keystab.study.result_folders import with_normal_paths
 
 Settings = dict[str, Any]
 Schema = Mapping[str, Any]
@@ -38,20 +40,11 @@ def read_yaml(*paths: Path | str) -> Settings:
     Raises
     ------
     InputError
-        If a file is missing, is not YAML, or is not a block of settings.
+        If a file is missing, is not plain YAML in UTF-8, or is not a block of settings.
     """
     merged: Settings = {}
     for path in paths:
-        try:
-            given = yaml.safe_load(Path(path).read_text(encoding="utf-8")) or {}
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-        except yaml.YAMLError as error:
-            mark = getattr(error, "problem_mark", None)
-            where = f" in line {mark.line + 1}" if mark else ""
-            raise InputError(
-                f"{path}: is not YAML{where}: {getattr(error, 'problem', '')}"
-            ) from None
+        given = read_plain_yaml(path) or {}
         if not isinstance(given, dict):
             raise InputError(f"{path}: holds no settings; write lines such as 'draft: true'")
         merge(merged, given)
@@ -72,7 +65,7 @@ def checked(given: Settings, schema: Schema) -> Settings:
     Returns
     -------
     dict
-        All settings of the schema.
+        All settings of the schema, folders written in one way (`normal_folder`).
 
     Raises
     ------
@@ -81,8 +74,7 @@ def checked(given: Settings, schema: Schema) -> Settings:
     """
     kept = without_null_entries(given, schema)
     refuse(schema_problems(kept, schema))
-    complete: dict[str, Any] = completed(kept, schema)
-    return complete
+    return with_normal_paths(completed(kept, schema))
 
 
 def refuse(problems: Sequence[str]) -> None:
@@ -298,6 +290,11 @@ def _what_to_type(value: Any, schema: Schema) -> str:
     """Ending of a line that guesses what was meant, or names the default."""
     types = schema.get("type", [])
     types = [types] if isinstance(types, str) else types
+    if _is_number(value) and not _computable(value) and value - value == 0:
+        return f", between {_LEAST:g} and {_MOST:g} in size"
+    if isinstance(value, bool) and not {"boolean", "null"} & set(types):
+        said = "yes, on and true" if value else "no, off and false"
+        return f" (YAML reads {said} alike; put text into quotes)"
     if isinstance(value, str) and {"number", "integer"} & set(types):
         try:
             return f": write {_yaml_number(float(value))}"
@@ -328,12 +325,27 @@ def _yaml_number(value: float) -> str:
     return mantissa + e + exponent
 
 
+_LEAST, _MOST = 1e-30, 1e30
+"""Sizes of numbers: beyond them, squares and ratios leave what floats can hold."""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _computable(value: float) -> bool:
+    return value == 0 or _LEAST <= abs(value) <= _MOST
+
+
 def _check_type(validator: Any, types: Any, value: Any, schema: Schema) -> Iterator[Any]:
     """The standard check, and numbers must be finite unless the schema says ``infinite``."""
     if isinstance(value, float) and (
         math.isnan(value) or (math.isinf(value) and not schema.get("infinite"))
     ):
         yield jsonschema.ValidationError("not finite")
+        return
+    if _is_number(value) and not _computable(value) and value - value == 0:  # finite
+        yield jsonschema.ValidationError("not computable")
         return
     yield from jsonschema.Draft202012Validator.VALIDATORS["type"](validator, types, value, schema)
 
