@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import runpy
 
@@ -22,6 +23,15 @@ ROWS = {
 
 def row_of(place: str, separator: str = ".") -> object:
     return ROWS[place] if place in ROWS else ROWS[f"{place.rpartition(separator)[0]}{separator}*"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def variables_as_they_were():
+    """Forget the variables that planning in this process sets for jobs."""
+    saved = dict(os.environ)
+    yield
+    os.environ.clear()
+    os.environ.update(saved)
 
 
 @pytest.fixture(scope="module")
