@@ -66,6 +66,12 @@ def project(tmp_path: Path) -> Project:
 
 
 @pytest.fixture(scope="session")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    """A copy in which nothing is ever run or edited."""
+    return copy_of_project(tmp_path_factory.mktemp("planned") / "project", own_library=False)
+
+
+@pytest.fixture(scope="session")
 def touched(tmp_path_factory: pytest.TempPathFactory) -> Project:
     """A copy that Snakemake takes for finished: empty outputs, with all that it remembers."""
     return Project(made_once(tmp_path_factory, "touched", touch_all))

@@ -16,8 +16,8 @@ PICTURES = sorted((ROOT / "config/pictures").glob("*.yaml"))
 LEDGER = f"{','.join(FIELDS)}\none,,,,,,,,,reproduced,\n"
 
 
-def test_whole_study_at_the_papers_settings(project):
-    jobs = project.would_run()
+def test_whole_study_at_the_papers_settings(planned):
+    jobs = planned.would_run()
     assert {*FIGURES, "all"} <= jobs.keys()
     # Of the default scene and two further ones, of which no scale-space is kept.
     assert (jobs["detect"], jobs["scale_space"]) == (3 * 17, 3)
@@ -42,8 +42,8 @@ def test_whole_study_at_the_papers_settings(project):
         ("figures/quick/predictors.pdf", {"simulate", "scale_space", "detect", "match_samplings", "find_true_extrema", "score_predictors", "predictors"}),
     ],
 )  # fmt: skip
-def test_figures_need_only_what_they_show(project, target, rules):
-    assert project.would_run("--configfile", "config/quick.yaml", "--", target).keys() == rules
+def test_figures_need_only_what_they_show(planned, target, rules):
+    assert planned.would_run("--configfile", "config/quick.yaml", "--", target).keys() == rules
 
 
 @pytest.mark.parametrize(("keep", "stored"), [("true", 6), ("false", 0)])
@@ -57,14 +57,14 @@ def test_any_sampling_can_be_stored_or_streamed(project, keep, stored):
 
 
 @pytest.mark.parametrize("overlay", sorted((ROOT / "config/what_if").glob("*.yaml")), ids=str)
-def test_what_ifs_can_be_planned(project, overlay):
-    jobs = project.would_run("--configfile", f"config/what_if/{overlay.name}")
+def test_what_ifs_can_be_planned(planned, overlay):
+    jobs = planned.would_run("--configfile", f"config/what_if/{overlay.name}")
     assert jobs["fig6"] == 1
 
 
 @pytest.mark.parametrize("overlay", PICTURES, ids=lambda path: path.stem)
-def test_the_whole_study_fits_the_other_pictures(project, overlay):
-    jobs = project.would_run("--configfile", f"config/pictures/{overlay.name}")
+def test_the_whole_study_fits_the_other_pictures(planned, overlay):
+    jobs = planned.would_run("--configfile", f"config/pictures/{overlay.name}")
     assert {*FIGURES, "all", "claims"} <= jobs.keys()
 
 
@@ -107,19 +107,19 @@ def test_rules_of_figures_take_the_tables_that_the_figures_read(figure):
 # Further scenes
 
 
-def test_a_further_scene_is_studied_by_the_same_rules(project):
+def test_a_further_scene_is_studied_by_the_same_rules(planned):
     quick = ("--configfile", "config/quick.yaml", "--")
-    jobs = project.would_run(*quick, "results/quick/scenes/stream/final.sha256")
-    own = project.would_run(*quick, "results/quick/final.sha256")
+    jobs = planned.would_run(*quick, "results/quick/scenes/stream/final.sha256")
+    own = planned.would_run(*quick, "results/quick/final.sha256")
     # All but what kept scale-spaces, several scenes and the figures of theory ask for.
     assert own.keys() - jobs.keys() == {"scale_space", "score_predictors", "predictors", "fig1", "figS3", "figS4"}  # fmt: skip
     assert jobs.keys() <= own.keys() and sum(jobs.values()) <= sum(own.values())
     target = "figures/quick/scenes/stream/fig5.pdf"
-    assert project.would_run(*quick, target).keys() == {"simulate", "detect", "match_samplings", "score_features", "fig5"}  # fmt: skip
+    assert planned.would_run(*quick, target).keys() == {"simulate", "detect", "match_samplings", "score_features", "fig5"}  # fmt: skip
 
 
-def test_a_scene_that_is_not_in_the_settings_is_refused(project):
-    status, said = project.dry_run(
+def test_a_scene_that_is_not_in_the_settings_is_refused(planned):
+    status, said = planned.dry_run(
         "--configfile", "config/quick.yaml", "--", "results/quick/scenes/roof/claims.csv"
     )
     assert status != 0 and "MissingRuleException" in said
