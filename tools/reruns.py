@@ -235,6 +235,7 @@ SPECIAL: dict[str, list[Any]] = {
 TOGETHER: dict[str, dict[str, Any]] = {
     "sets.examples.n_views": {"n_views": 2, "blur": [0.5, 1.0], "step": [20, 14]},
     "sets.blur_errors.n_views": {"n_views": 2, "blur": [0.7, 0.3]},
+    "sets.shots.n_views": {"n_views": 2, "blur": [0.8, 0.5]},
 }
 """Settings that others of their block must follow."""
 
