@@ -82,6 +82,7 @@ def plan(overlay: Mapping[str, Any] | None = None) -> Plan:
             SnakemakeApi(OutputSettings(quiet={Quietness.ALL})) as api,
             contextlib.redirect_stdout(io.StringIO()),
             unittest.mock.patch.object(feasibility, "require"),  # done, see change
+            unittest.mock.patch.dict(os.environ),  # the Snakefile sets variables for jobs
         ):
             (Path(empty) / "config").symlink_to(ROOT / "config")
             planned = api.workflow(

@@ -17,12 +17,6 @@ from keystab.provenance import archive
 from keystab.provenance.study_folder import Study
 
 
-@pytest.fixture(autouse=True)
-def modules_beside_scripts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forget what planning in this process sets for jobs: tools import modules beside them."""
-    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
-
-
 @pytest.fixture
 def snakemake_in_forks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Run Snakemake in forks of this process, which spares its import every time."""
