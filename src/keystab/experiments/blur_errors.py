@@ -15,14 +15,58 @@ changes as well.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from keystab.errors import InputError
 from keystab.evaluation.intervals import wilson_interval
+from keystab.matching.common_range import CommonRange
 from keystab.matching.correspondence import matched, pairs_between
+
+
+def errors_by_octave(
+    keypoints: pd.DataFrame,
+    everywhere: CommonRange,
+    blurs: Sequence[float],
+    assumed: float,
+    kappa: float,
+    same: Mapping[str, Any],
+) -> pd.DataFrame:
+    """Compare views in the first and in the second octave of the range that they have in common.
+
+    Parameters
+    ----------
+    keypoints : DataFrame
+        ``view, y, x, sigma`` of the refined keypoints of all views, each in its own frame.
+    everywhere : CommonRange
+        Field of view and range of scales of all views.
+    blurs, assumed, kappa, same
+        See `blur_error_table`.
+
+    Returns
+    -------
+    DataFrame
+        See `blur_error_table`; ``scales`` are "first octave" and "second octave".
+
+    Raises
+    ------
+    InputError
+        If the blur of the first view is not the assumed one.
+    """
+    if blurs[0] != assumed:
+        raise InputError(
+            f"the first view has blur {blurs[0]:g}, wanted is the assumed {assumed:g}: "
+            "put it first in the list of blurs"
+        )
+    low = everywhere.low
+    octaves = {"first octave": (low, 2 * low), "second octave": (2 * low, 4 * low)}
+    # Keypoints move across the ends of the ranges: those beyond are needed as counterparts.
+    common = replace(everywhere, low=0.0).common(keypoints)
+    return blur_error_table(common, blurs, assumed, kappa, octaves, same)
 
 
 def blur_error_table(

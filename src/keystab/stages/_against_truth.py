@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pandas as pd
@@ -10,6 +10,14 @@ import pandas as pd
 from keystab.evaluation.recall_precision import recall_and_precision, with_positions
 from keystab.parameters import Tolerance
 from keystab.stages._compared import Inside
+
+
+def detections(
+    discrete: pd.DataFrame, refined: pd.DataFrame
+) -> Iterator[tuple[str, pd.DataFrame, str]]:
+    """What is evaluated: a name, detections, and the column of their scale."""
+    yield "discrete", discrete, "step_sigma"
+    yield "refined", refined, "sigma"
 
 
 def evaluation(

@@ -26,9 +26,9 @@ def main(
     from keystab.io.scale_space_store import StoredScaleSpace
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
-    from keystab.stages._scale_spaces import balanced_space
+    from keystab.stages._scale_spaces import sampled_space
 
-    space = balanced_space(read_view(*views), n_spo, detection)
+    space = sampled_space(read_view(*views), n_spo, detection)
     if store is None:
         found = discrete_extrema(space, detection.epsilon, show_progress=True)
     else:

@@ -12,16 +12,9 @@ def main(blobs: Blobs, *, extrema: Path, traces: Path) -> None:
     from keystab.experiments.blob_scales import detect_blobs, sizes
     from keystab.io.tables import write_table
 
-    it = blobs
-    found, models = detect_blobs(
-        sizes(it.size_from, it.size_to, it.size_count),
-        it.kappa,
-        it.kappas,
-        it.n_spo,
-        it.camera_blur,
-        it.assumed_blurs,
-        it.sigma_min,
-    )
+    how = dict(vars(blobs))
+    ends = [how.pop(name) for name in ("size_from", "size_to", "size_count")]
+    found, models = detect_blobs(sizes(*ends), **how)
     write_table(found, extrema)
     write_table(models, traces)
     print(f"{len(found)} extrema")

@@ -17,20 +17,12 @@ def main(
     from keystab.detection.extrema import extrema_and_cubes
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
-    from keystab.scalespace.dog import scale_space
+    from keystab.stages._scale_spaces import sampled_space
 
     view = read_view(*views)
     tables = []
     for step in delta_min:
-        space = scale_space(
-            view.image,
-            view.blur,
-            n_spo,
-            step,
-            detection.sigma_min,
-            detection.kappa,
-            detection.oversampling,
-        )
+        space = sampled_space(view, n_spo, detection, step)
         found = extrema_and_cubes(space, detection.epsilon, show_progress=True)
         table = extrema_table(space, *found)
         table.insert(0, "n_spo", n_spo)

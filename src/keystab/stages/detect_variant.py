@@ -23,7 +23,7 @@ def main(
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
     from keystab.parameters import DifferenceOfGaussians
-    from keystab.stages._scale_spaces import balanced_space
+    from keystab.stages._scale_spaces import sampled_space
     from keystab.utils.progress import progress
 
     view = read_view(*views)
@@ -32,7 +32,7 @@ def main(
     columns = ["y", "x", "sigma", "value", "sign", "step_sigma", "difference"]
     parts = []
     for n in progress(n_spo, len(n_spo), "samplings"):
-        space = balanced_space(view, n, dog)
+        space = sampled_space(view, n, dog)
         if variant.arithmetic == "float32":
             found = single_precision_extrema(space, variant.epsilon, variant.grey_range)
         else:

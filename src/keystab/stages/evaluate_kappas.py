@@ -27,7 +27,7 @@ def main(
     from keystab.detection.refinement import refined_keypoints
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
-    from keystab.stages._against_truth import evaluation
+    from keystab.stages._against_truth import detections, evaluation
     from keystab.stages._compared import inside
 
     here = inside(compared, sigma_min, read_view(*views).shape)
@@ -36,10 +36,7 @@ def main(
     rows = []
     for kappa, path in zip(kappas, truths, strict=True):
         evaluated = evaluation(read_table(path), here, tolerance)
-        for name, found, scale in (
-            ("discrete", discrete, "step_sigma"),
-            ("refined", refined, "sigma"),
-        ):
+        for name, found, scale in detections(discrete, refined):
             own = found[np.isclose(found["kappa"], kappa)].reset_index(drop=True)
             rows.append({"kappa": kappa, "detections": name} | evaluated(own, scale))
     result = pd.DataFrame(rows)

@@ -27,12 +27,12 @@ def main(
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
     from keystab.stages._compared import inside
-    from keystab.stages._scale_spaces import balanced_space
+    from keystab.stages._scale_spaces import sampled_space
 
     view, true = read_view(*views), read_table(truth)
     parts = [
         choice_table(
-            balanced_space(view, n, dog),
+            sampled_space(view, n, dog),
             read_table(path),
             true,
             inside(compared, dog.sigma_min, view.shape),

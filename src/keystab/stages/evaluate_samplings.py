@@ -27,7 +27,7 @@ def main(
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling
-    from keystab.stages._against_truth import evaluation
+    from keystab.stages._against_truth import detections, evaluation
     from keystab.stages._compared import inside
 
     view = read_view(*views)
@@ -40,10 +40,7 @@ def main(
         sampling = Sampling.balanced(view.shape, view.blur, n, dog.sigma_min, dog.kappa)
         refined = refined_table(sampling, extrema, read_table(traces_path), **vars(accepted))
         labels = {"oversampling": dog.oversampling, "n_spo": n, "delta_min": sampling.delta_min}
-        for name, found, scale in (
-            ("discrete", extrema, "step_sigma"),
-            ("refined", refined, "sigma"),
-        ):
+        for name, found, scale in detections(extrema, refined):
             rows.append(labels | {"detections": name} | evaluated(found, scale))
     result = pd.DataFrame(rows)
     write_table(result, table)

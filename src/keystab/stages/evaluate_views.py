@@ -35,6 +35,7 @@ def main(
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_views
     from keystab.matching.common_range import CommonRange
+    from keystab.stages._against_truth import detections
 
     seen_from = read_views(*views).specs[0]
     scene = read_table(truth)
@@ -53,16 +54,11 @@ def main(
         field, true = seen(store, guard)
         discrete = read_table(extrema_path)
         refined = refined_keypoints(discrete, read_table(traces_path), **vars(accepted))
-        for name, found, scale in (
-            ("discrete", discrete, "step_sigma"),
-            ("refined", refined, "sigma"),
-        ):
+        for name, found, scale in detections(discrete, refined):
             labels = {"sweep": sweep, "value": value, "n_spo": n, "detections": name}
-            common = field.common(found, scale)
-            rows.append(
-                labels
-                | mean_over_views(common, true, len(field.specs), limits, scale, vars(tolerance))
-            )
+            common, how = field.common(found, scale), vars(tolerance)
+            means = mean_over_views(common, true, len(field.specs), limits, scale, how)
+            rows.append(labels | means)
     result = pd.DataFrame(rows)
     write_table(result, table)
     print(result[[*labels, "recall", "precision"]].to_string(index=False))

@@ -22,15 +22,9 @@ def main(
     from keystab.io.view_store import read_views
     from keystab.truth.scene_extrema import scene_extrema
 
-    spec = read_views(*views).specs[0]
-    extrema = scene_extrema(
-        read_picture(reference),
-        spec,
-        scales.sigma_min,
-        sigma_max,
-        scales.kappa,
-        reference_blur,
-    )
+    picture, spec = read_picture(reference), read_views(*views).specs[0]
+    ends, kappa = (scales.sigma_min, sigma_max), scales.kappa
+    extrema = scene_extrema(picture, spec, *ends, kappa, reference_blur)
     write_table(extrema, table)
     print(f"{len(extrema)} true extrema of the scene")
 

@@ -12,20 +12,10 @@ def main(blobs: Blobs, extrema: Path, traces: Path, accepted: Acceptance, *, tab
     from keystab.experiments.blob_scales import blob_table, sizes
     from keystab.io.tables import read_table, write_table
 
-    it = blobs
-    result = blob_table(
-        sizes(it.size_from, it.size_to, it.size_count),
-        it.kappa,
-        it.kappas,
-        it.n_spo,
-        it.camera_blur,
-        it.assumed_blurs,
-        it.sigma_min,
-        accepted.max_offset,
-        accepted.max_iterations,
-        (read_table(extrema), read_table(traces)),
-    )
-    write_table(result, table)
+    how = {**vars(blobs), **vars(accepted)}
+    ends = [how.pop(name) for name in ("size_from", "size_to", "size_count")]
+    found = (read_table(extrema), read_table(traces))
+    write_table(blob_table(sizes(*ends), **how, detections=found), table)
 
 
 if __name__ == "__main__":

@@ -20,35 +20,17 @@ def main(
     table: Path,
 ) -> None:
     """Read extrema and traces of the set; write one row per view and range of scales."""
-    from dataclasses import replace
-
     from keystab.detection.refinement import refined_keypoints
-    from keystab.errors import InputError
-    from keystab.experiments.blur_errors import blur_error_table
+    from keystab.experiments.blur_errors import errors_by_octave
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_views
     from keystab.stages._compared import common_range
 
     seen = read_views(*views)
     blurs = [spec.blur for spec in seen.specs]
-    if blurs[0] != assumed_blur:
-        raise InputError(
-            f"the first view has blur {blurs[0]:g}, wanted is the assumed {assumed_blur:g}: "
-            "put it first in the list of blurs"
-        )
-    everywhere = common_range(seen, compared)
     keypoints = refined_keypoints(read_table(extrema), read_table(traces), **vars(accepted))
-    low = everywhere.low
-    # Keypoints move across the ends of the ranges: those beyond are needed as counterparts.
-    searched = replace(everywhere, low=0.0)
-    result = blur_error_table(
-        searched.common(keypoints),
-        blurs,
-        assumed_blur,
-        kappa,
-        {"first octave": (low, 2 * low), "second octave": (2 * low, 4 * low)},
-        vars(same),
-    )
+    everywhere = common_range(seen, compared)
+    result = errors_by_octave(keypoints, everywhere, blurs, assumed_blur, kappa, vars(same))
     write_table(result, table)
     print(result.to_string(index=False))
 

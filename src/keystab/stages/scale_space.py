@@ -10,9 +10,9 @@ def main(views: Store, n_spo: int, dog: DifferenceOfGaussians, *, store: Store) 
     from keystab.io.checksums import write_checksums
     from keystab.io.scale_space_store import write_scale_space
     from keystab.io.view_store import read_view
-    from keystab.stages._scale_spaces import balanced_space
+    from keystab.stages._scale_spaces import sampled_space
 
-    space = balanced_space(read_view(*views), n_spo, dog)
+    space = sampled_space(read_view(*views), n_spo, dog)
     write_scale_space(space, store.path)
     write_checksums(*store)
     print("x".join(map(str, space.shape)), "samples")
