@@ -27,15 +27,17 @@ point: the units of length of the scale-space itself, which a zoom leaves alone
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keystab.scalespace import cosine_series
 
-__all__ = ["DogSeries", "Jets"]
+__all__ = ["ContinuousDog", "DogSeries", "Jets"]
 
 #: Entries of the largest array that a block of points needs; bounds the memory to some 100 MB.
 _MOST_ENTRIES = 2**21
@@ -68,11 +70,42 @@ class Jets:
         """Jets of some of the points."""
         return Jets(self.value[rows], self.gradient[rows], self.hessian[rows])
 
+    @classmethod
+    def joined(cls, parts: Sequence[Jets]) -> Jets:
+        """Jets of several sets of points, one after the other."""
+        names = ("value", "gradient", "hessian")
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
     def put(self, rows: NDArray[np.bool_] | NDArray[np.intp], other: Jets) -> None:
         """Write the jets of some of the points."""
         self.value[rows] = other.value
         self.gradient[rows] = other.gradient
         self.hessian[rows] = other.hessian
+
+
+class ContinuousDog(Protocol):
+    """A difference of Gaussians that is known everywhere, however its sums are taken."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the image in pixels."""
+
+    @property
+    def blur(self) -> float:
+        """Gaussian blur that the image already has, in its pixels."""
+
+    @property
+    def contrast(self) -> float:
+        """Root mean square of the image about its mean."""
+
+    def jets(
+        self,
+        sigma: NDArray[np.float64],
+        y: NDArray[np.float64],
+        x: NDArray[np.float64],
+        within_slices: bool = False,
+    ) -> Jets:
+        """Value, gradient and Hessian at scattered points, see `DogSeries.jets`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ approximated.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from keystab.errors import InputError
 from keystab.utils.masks import unmasked
 
-__all__ = ["basis", "coefficients", "evaluate", "evaluate_at", "gaussian", "significant"]
+__all__ = ["basis", "coefficients", "evaluate", "evaluate_at", "gaussian", "sampled", "significant"]
 
 #: Frequencies that a blur multiplies by less than this are left out. A picture in [0, 1] has
 #: coefficients of at most 4, so that what is left out stays below the rounding of the sum.
@@ -68,6 +69,50 @@ def coefficients(u: ArrayLike) -> NDArray[np.float64]:
     a[0, :] *= 0.5
     a[:, 0] *= 0.5
     return a
+
+
+def sampled(
+    coefs: NDArray[np.float64], shape: tuple[int, int], gains: Sequence[NDArray[np.float64]] = ()
+) -> NDArray[np.float64]:
+    """Values of a series on a grid of other samples between the same mirrors.
+
+    Parameters
+    ----------
+    coefs : ndarray, shape (K, L)
+        Leading coefficients of the series of an image of height H and width W.
+    shape : (int, int)
+        Samples m and n along y and along x: sample i lies at ``(i + 1/2) H / m - 1/2``. At least K
+        and L, so that all frequencies are held.
+    gains : two ndarrays, shapes (K,) and (L,), optional
+        Factors of the frequencies of either axis, such as those of a blur.
+
+    Returns
+    -------
+    ndarray, shape (m, n)
+        Exact but for rounding; by fast transforms.
+
+    Examples
+    --------
+    >>> a = coefficients([[0.0, 1.0], [2.0, 5.0]])
+    >>> sampled(a, (2, 2)).round(12)
+    array([[0., 1.],
+           [2., 5.]])
+    >>> bool(np.allclose(sampled(a, (4, 2)), evaluate(a, [-0.25, 0.25, 0.75, 1.25], [0, 1])))
+    True
+    """
+    from scipy import fft
+
+    values: NDArray[np.float64] = np.zeros(shape)
+    part = values[: coefs.shape[0], : coefs.shape[1]]
+    part[:] = coefs
+    for axis, gain in enumerate(gains):
+        part *= np.expand_dims(gain, 1 - axis)
+    # The transform adds up every cosine twice but for frequency 0.
+    part[1:, :] /= 2
+    part[:, 1:] /= 2
+    for axis in (0, 1):
+        values = fft.dct(values, type=3, axis=axis, overwrite_x=True)
+    return values
 
 
 def gaussian(n: int, blur: float) -> NDArray[np.float64]:

@@ -9,15 +9,16 @@ to it.
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keystab.scalespace.continuous_dog import DogSeries, Jets
+from keystab.scalespace.continuous_dog import ContinuousDog, Jets
 from keystab.truth.seeds import Seeds
 from keystab.utils.progress import progress_if_watched
 
-__all__ = ["climb", "climbed", "folded", "newton_step"]
+__all__ = ["climb", "climbed", "folded", "newton_step", "range_of_climbs"]
 
 #: Climbs may go beyond the range of scales by this factor, and below the image's own blur, where
 #: it cannot be sampled but sums may go.
@@ -30,9 +31,12 @@ _FIRST_RADIUS, _LARGEST_RADIUS, _LEAST_RADIUS, _HELD_RADIUS = 0.2, 0.3, 1e-7, 0.
 
 _MOST_STEPS = 200
 
+#: Climbs that are made in step with each other.
+_AT_ONCE = 2048
+
 
 def climb(
-    series: DogSeries, seeds: Seeds, sigma_min: float, sigma_max: float
+    series: ContinuousDog, seeds: Seeds, sigma_min: float, sigma_max: float, threads: int = 1
 ) -> tuple[NDArray[np.float64], Jets]:
     r"""Climb from each seed to an extremum of its sign; returns those that arrive.
 
@@ -46,8 +50,10 @@ def climb(
     Parameters
     ----------
     series, seeds, sigma_min, sigma_max
-        See `keystab.truth.true_extrema.extrema_from`. Climbs that leave the range of scales by more
-        than a factor of 2**0.4, or go below 0.92 of the image's own blur, are given up.
+        See `keystab.truth.true_extrema.extrema_from`. Climbs that leave `range_of_climbs` are given
+        up.
+    threads : int
+        Climbs at once. No climb depends on another.
 
     Returns
     -------
@@ -56,16 +62,31 @@ def climb(
     jets : Jets
         Value, gradient and Hessian there.
     """
-    low = max(sigma_min / _CLIMBS_BEYOND, _BELOW_BLUR * series.blur)
-    bounds = (low, sigma_max * _CLIMBS_BEYOND)
-    within = (seeds.sigma >= bounds[0]) & (seeds.sigma <= bounds[1])
-    points = np.stack([seeds.sigma, seeds.y, seeds.x], axis=1)[within]
-    points, jets, arrived = climbed(series, points, seeds.sign[within], bounds)
-    return points[arrived], jets[arrived]
+    bounds = range_of_climbs(series.blur, sigma_min, sigma_max)
+    within = np.flatnonzero((seeds.sigma >= bounds[0]) & (seeds.sigma <= bounds[1]))
+    points = np.stack([seeds.sigma, seeds.y, seeds.x], axis=1)
+
+    def arrivals(rows: NDArray[np.intp]) -> tuple[NDArray[np.float64], Jets]:
+        ends, jets, arrived = climbed(series, points[rows], seeds.sign[rows], bounds)
+        return ends[arrived], jets[arrived]
+
+    parts = [within[start : start + _AT_ONCE] for start in range(0, within.size, _AT_ONCE)]
+    with ThreadPoolExecutor(threads) as pool:
+        found = list(progress_if_watched(pool.map(arrivals, parts), len(parts), "climbs"))
+    found.append((np.empty((0, 3)), Jets(np.empty(0), np.empty((0, 3)), np.empty((0, 3, 3)))))
+    ends, jets = zip(*found, strict=True)
+    return np.concatenate(ends), Jets.joined(jets)
+
+
+def range_of_climbs(blur: float, sigma_min: float, sigma_max: float) -> tuple[float, float]:
+    """Scales between which climbs go: a factor of 2**0.4 beyond what is reported, but not below
+    0.92 of the blur that the image has.
+    """
+    return max(sigma_min / _CLIMBS_BEYOND, _BELOW_BLUR * blur), sigma_max * _CLIMBS_BEYOND
 
 
 def climbed(
-    series: DogSeries,
+    series: ContinuousDog,
     points: NDArray[np.float64],
     sign: NDArray[np.float64],
     bounds: tuple[float, float] | None,
@@ -74,7 +95,7 @@ def climbed(
 
     Parameters
     ----------
-    series : DogSeries
+    series : ContinuousDog
         The scale-space.
     points : ndarray, shape (n, 3)
         Scale and position where climbs start.
@@ -98,7 +119,7 @@ def climbed(
     jets = _jets(series, points, bounds is None)
     radius = np.full(sign.size, _FIRST_RADIUS)
     active = np.arange(sign.size)
-    for _ in progress_if_watched(range(_MOST_STEPS), _MOST_STEPS, "steps of climbs, at most"):
+    for _ in range(_MOST_STEPS):
         here = jets[active]
         model = here if bounds else _of_slice(here, sign[active], series.contrast)
         step, promised, at_end = _step(model, sign[active], radius[active])
@@ -189,7 +210,7 @@ def folded(points: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.fl
     return inside
 
 
-def _jets(series: DogSeries, points: NDArray[np.float64], within_slices: bool = False) -> Jets:
+def _jets(series: ContinuousDog, points: NDArray[np.float64], within_slices: bool = False) -> Jets:
     sigma, y, x = points.T
     return series.jets(sigma, y, x, within_slices)
 
@@ -204,7 +225,7 @@ def _of_slice(jets: Jets, sign: NDArray[np.float64], contrast: float) -> Jets:
 
 
 def _polish(
-    series: DogSeries,
+    series: ContinuousDog,
     points: NDArray[np.float64],
     jets: Jets,
     sign: NDArray[np.float64],

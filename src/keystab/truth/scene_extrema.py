@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from keystab.camera.simulation import Scene, simulate
 from keystab.camera.views import ViewSpec, to_reference, to_view
 from keystab.scalespace.continuous_dog import DogSeries
-from keystab.truth.newton import folded
+from keystab.scalespace.local_dog import LocalDog
+from keystab.truth.newton import folded, range_of_climbs
 from keystab.truth.seeds import (
     SEED_SAMPLINGS,
     SEEDS_BEYOND,
@@ -117,12 +118,12 @@ def scene_extrema(
     check_scales(own_blur / spec.step, sigma_min, sigma_max, kappa)
     samplings = listed(n_spo)
     coefs = scene.coefficients.copy()
-    coefs[0, 0] = 0.0
-    series = DogSeries(coefs, scene.shape, own_blur, float(kappa))
-    # Where climbs may go, with room to spare.
-    series = series.truncated(max(0.7 * sigma_min * spec.step, own_blur))
+    coefs[0, 0] = 0.0  # no difference of Gaussians has a mean
+    whole = DogSeries(coefs, scene.shape, own_blur, float(kappa))
+    ends = (sigma_min * spec.step, sigma_max * spec.step)
+    series = LocalDog.of_series(whole, *range_of_climbs(own_blur, *ends))
     seeds = _seeds(scene, spec, sigma_min, sigma_max, series, samplings, threads)
-    found = extrema_from(series, seeds, sigma_min * spec.step, sigma_max * spec.step)
+    found = extrema_from(series, seeds, *ends, threads)
     return _seen(found, spec, scene.shape)
 
 
@@ -131,7 +132,7 @@ def _seeds(
     spec: ViewSpec,
     sigma_min: float,
     sigma_max: float,
-    series: DogSeries,
+    series: LocalDog,
     samplings: list[int],
     threads: int,
 ) -> Seeds:

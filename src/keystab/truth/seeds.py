@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from keystab.detection.extrema import discrete_extrema, extrema_of_array
 from keystab.errors import InputError
-from keystab.scalespace.continuous_dog import DogSeries, Jets
+from keystab.scalespace.continuous_dog import ContinuousDog, Jets
 from keystab.scalespace.dog import ScaleSpace, ranges, scale_space
 from keystab.utils import validation
 
 __all__ = [
     "Seeds",
     "along_curve",
+    "coarser",
     "growing",
     "joined",
     "listed",
@@ -96,7 +97,7 @@ def seeds_of_first_slice(space: ScaleSpace) -> Seeds:
     return Seeds(sigma, space.y[row], space.x[column], sign.astype(np.float64))
 
 
-def growing(series: DogSeries, seeds: Seeds) -> Seeds:
+def growing(series: ContinuousDog, seeds: Seeds) -> Seeds:
     r"""Seeds near which s w grows with scale.
 
     By the second-order model at the seed, restricted to where the derivatives along y and x
@@ -136,6 +137,12 @@ def along_curve(jets: Jets) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         slope = jets.gradient[:, 0] + (direction * jets.gradient[:, 1:]).sum(axis=1)
         curvature = h[:, 0, 0] + (direction * h[:, 0, 1:]).sum(axis=1)
     return slope, curvature
+
+
+def coarser(seeds: Seeds, factor: float) -> Seeds:
+    """Seeds of a picture that is sampled more finely, in pixels of the picture itself."""
+    y, x = ((p + 0.5) / factor - 0.5 for p in (seeds.y, seeds.x))
+    return Seeds(seeds.sigma / factor, y, x, seeds.sign)
 
 
 def joined(seeds: list[Seeds]) -> Seeds:

@@ -20,13 +20,16 @@ import numpy as np
 import pandas as pd
 
 from keystab.errors import InputError
-from keystab.scalespace.continuous_dog import DogSeries
+from keystab.scalespace.continuous_dog import ContinuousDog, DogSeries
+from keystab.scalespace.cosine_series import sampled
 from keystab.scalespace.dog import checked_image
-from keystab.truth.newton import climb, newton_step
+from keystab.scalespace.local_dog import LocalDog
+from keystab.truth.newton import climb, newton_step, range_of_climbs
 from keystab.truth.seeds import (
     SEED_SAMPLINGS,
     SEEDS_BEYOND,
     Seeds,
+    coarser,
     growing,
     joined,
     listed,
@@ -40,6 +43,9 @@ __all__ = ["extrema_from", "true_extrema"]
 
 SAME = 1e-6
 """Extrema that differ by less in y, in x and in sigma (pixels) are one."""
+
+#: The image's series is sampled so many times as finely where seeds are sought.
+_FINER = 2
 
 #: Gradient, relative to the contrast of the image, at which an extremum counts as found.
 RESIDUAL = 1e-12
@@ -68,7 +74,7 @@ def true_extrema(
               - e^{-(\sigma^2 - c^2)(f_k^2 + g_l^2)/2} \right)
 
     an analytic function. Its extrema in scale and position are found by Newton's method on the
-    full sums, from the discrete extrema of several samplings.
+    local sums (`keystab.scalespace.local_dog`), from the discrete extrema of several samplings.
 
     Parameters
     ----------
@@ -84,7 +90,7 @@ def true_extrema(
         Scales per octave of the (balanced) samplings whose discrete extrema are the seeds. What
         is found at a given place does not depend on them, only whether it is found.
     threads : int
-        Threads of the search for seeds. The result does not depend on it.
+        Threads of the search for seeds and of the climbs. The result does not depend on it.
 
     Returns
     -------
@@ -134,9 +140,7 @@ def true_extrema(
     dense find the same 883 extrema, and a second search that follows the extrema of each scale
     through the scales, in the tests, finds nothing else.
 
-    Every evaluation is a sum over all pixels' worth of coefficients, and the number of extrema
-    grows with the picture too: time grows with the square of its area. A picture of 400 x 225
-    pixels takes 20 s on one core.
+    TIME
 
     The noise and the aliasing of an image are part of it; `keystab.scene_extrema` gives the
     extrema that a view of a known scene should have.
@@ -156,39 +160,48 @@ def true_extrema(
     array = checked_image(image)
     check_scales(camera_blur, sigma_min, sigma_max, kappa)
     samplings = listed(n_spo)
-    series = DogSeries.of_image(array, float(camera_blur), float(kappa))
+    coefs = DogSeries.of_image(array, float(camera_blur), float(kappa))
     low = max(sigma_min / SEEDS_BEYOND, camera_blur)
     high = sigma_max * SEEDS_BEYOND
-    spaces = [octave_of(array, camera_blur, n, low, high, kappa, "cosine") for n in samplings]
+    height, width = coefs.shape
+    # Sampled twice as finely, the series is as good as its spline, whose search is a local one.
+    finer = sampled(coefs.coefficients, (_FINER * height, _FINER * width))
+    spaces = [
+        octave_of(finer, _FINER * camera_blur, n, _FINER * low, _FINER * high, kappa, "spline")
+        for n in samplings
+    ]
     seeds = joined([seeds_of(space, threads) for space in spaces])
     first = seeds_of_first_slice(spaces[int(np.argmax(samplings))])
-    seeds = joined([seeds, growing(series, first)])
-    found = extrema_from(series, seeds, sigma_min, sigma_max)
-    height, width = series.shape
+    del spaces, finer
+    series = LocalDog.of_series(coefs, *range_of_climbs(coefs.blur, sigma_min, sigma_max))
+    seeds = joined([coarser(seeds, _FINER), growing(series, coarser(first, _FINER))])
+    found = extrema_from(series, seeds, sigma_min, sigma_max, threads)
     inside = found["y"].between(0, height - 1) & found["x"].between(0, width - 1)
     return found[inside].reset_index(drop=True)
 
 
 def extrema_from(
-    series: DogSeries, seeds: Seeds, sigma_min: float, sigma_max: float
+    series: ContinuousDog, seeds: Seeds, sigma_min: float, sigma_max: float, threads: int = 1
 ) -> pd.DataFrame:
     """Extrema that climbs from the seeds lead to, each once.
 
     Parameters
     ----------
-    series : DogSeries
+    series : ContinuousDog
         The scale-space.
     seeds : Seeds
         Where to start; in pixels of `series`.
     sigma_min, sigma_max : float
         Range of scales that is reported, in the same pixels.
+    threads : int
+        Climbs at once; the result does not depend on it.
 
     Returns
     -------
     DataFrame
         As `true_extrema` says, but wherever in the mirrored image a climb ended.
     """
-    points, jets = climb(series, seeds, sigma_min, sigma_max)
+    points, jets = climb(series, seeds, sigma_min, sigma_max, threads)
     eigenvalues = np.linalg.eigvalsh(jets.hessian)
     curvature = np.sort(np.abs(eigenvalues), axis=1)
     sign = np.where(eigenvalues[:, 0] > 0, -1, 1)
