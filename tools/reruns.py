@@ -82,6 +82,7 @@ def plan(overlay: Mapping[str, Any] | None = None) -> Plan:
             SnakemakeApi(OutputSettings(quiet={Quietness.ALL})) as api,
             contextlib.redirect_stdout(io.StringIO()),
             unittest.mock.patch.object(feasibility, "require"),  # done, see change
+            unittest.mock.patch.dict(os.environ),  # the Snakefile sets variables for jobs
         ):
             (Path(empty) / "config").symlink_to(ROOT / "config")
             planned = api.workflow(
@@ -235,6 +236,7 @@ SPECIAL: dict[str, list[Any]] = {
 TOGETHER: dict[str, dict[str, Any]] = {
     "sets.examples.n_views": {"n_views": 2, "blur": [0.5, 1.0], "step": [20, 14]},
     "sets.blur_errors.n_views": {"n_views": 2, "blur": [0.7, 0.3]},
+    "sets.shots.n_views": {"n_views": 2, "blur": [0.8, 0.5]},
 }
 """Settings that others of their block must follow."""
 

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import doctest
-
 import pytest
 import yaml
 
 from keystab.errors import InputError
 from keystab.provenance.lineage import _overlay
-from keystab.study import plain_yaml as module
 from keystab.study.claims import read_claims
 from keystab.study.plain_yaml import plain_yaml, read_plain_yaml
 from keystab.study.settings import read_yaml
-
-
-def test_examples():
-    failed, tried = doctest.testmod(module)
-    assert tried and not failed
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import doctest
 import re
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 import yaml
 
 from keystab.errors import InputError
-from keystab.study import feasibility, result_folders, settings
+from keystab.study import feasibility, settings
 from keystab.study.result_folders import normal_folder, path_problems
 
 ROOT = Path(__file__).parents[2]
@@ -24,11 +23,6 @@ def under(overlay: dict[str, object]) -> settings.Settings:
     given = copy.deepcopy(GIVEN)
     settings.merge(given, overlay)
     return settings.checked(given, SCHEMA)
-
-
-def test_examples():
-    failed, tried = doctest.testmod(result_folders)
-    assert tried and not failed
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import os
 import subprocess
 import sys
@@ -11,15 +10,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from keystab.provenance import shielded_environment
 from keystab.provenance.shielded_environment import shielded
 
 ROOT = Path(__file__).parents[2]
-
-
-def test_examples():
-    failed, tried = doctest.testmod(shielded_environment)
-    assert tried and not failed
 
 
 @pytest.mark.parametrize(

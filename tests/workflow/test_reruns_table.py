@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import runpy
 
@@ -23,15 +22,6 @@ ROWS = {
 
 def row_of(place: str, separator: str = ".") -> object:
     return ROWS[place] if place in ROWS else ROWS[f"{place.rpartition(separator)[0]}{separator}*"]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def variables_as_they_were():
-    """Forget the variables that planning in this process sets for jobs."""
-    saved = dict(os.environ)
-    yield
-    os.environ.clear()
-    os.environ.update(saved)
 
 
 @pytest.fixture(scope="module")
