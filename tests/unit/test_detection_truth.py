@@ -17,8 +17,9 @@ from keystab.detection.extrema import discrete_extrema
 from keystab.errors import InputError
 from keystab.io.pictures import write_picture
 from keystab.scalespace.dog import scale_space
+from keystab.scalespace.grid_kernels import cosine_domain_kernel
 from keystab.scalespace.sampling import balanced_delta
-from keystab.scalespace.spline_axis import SplineAxis, cosine_domain_kernel
+from keystab.scalespace.spline_axis import SplineAxis
 from keystab.truth.scene_extrema import scene_extrema
 from keystab.truth.true_extrema import true_extrema
 
