@@ -217,8 +217,14 @@ def test_a_straight_edge_has_no_keypoints(oversampling):
     assert len(detect_keypoints(image, 0.5, 12, refine=False, oversampling=oversampling)) == 0
 
 
-@pytest.mark.parametrize("refine", [True, False])
-@pytest.mark.parametrize("n_spo", [3, 5])
+@pytest.mark.parametrize(
+    ("n_spo", "refine"),
+    [
+        (3, True),
+        *(pytest.param(*it, marks=pytest.mark.slow) for it in ((5, True), (3, False))),
+        (5, False),
+    ],
+)
 def test_no_extremum_is_lost_or_doubled_at_seams(n_spo, refine):
     """Blobs whose scales lie around two seams: one keypoint each."""
     around = np.linspace(-1.2, 2.2, 32) / n_spo
