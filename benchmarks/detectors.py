@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 import keystab
-from keystab.detection import search_cosine, search_rows
-from keystab.scalespace import cosine_axis, dog
+from keystab.detection import search_cosine, search_lattice, search_nodes
+from keystab.scalespace import dog
 from keystab.scalespace.sampling import Sampling, balanced_delta
 
 CAMERA_BLUR = 1.1
@@ -57,11 +57,11 @@ def forget_operators() -> None:
     """Forget what keystab keeps for further images of one size: building it counts here."""
     for kept in (
         dog._axis,
-        search_rows.axis_blocks,
-        search_rows.blocks_abreast,
-        search_rows.expansion,
+        search_nodes.local_axis,
+        search_lattice._nodes,
+        search_lattice._kinked,
         search_cosine.interpolation,
-        cosine_axis.band_limited_basis,
+        search_cosine.band_limited_basis,
     ):
         kept.cache_clear()
 

@@ -327,7 +327,14 @@ def test_too_large_for_memory_is_refused_beforehand(picture, monkeypatch, capsys
     assert "needs about" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("options", [{}, {"n_spo": 15}, {"n_spo": 15, "oversampling": "cosine"}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        pytest.param({"n_spo": 15}, marks=pytest.mark.slow),
+        pytest.param({"n_spo": 15, "oversampling": "cosine"}, marks=pytest.mark.slow),
+    ],
+)
 def test_memory_estimate_bounds_what_is_taken(picture, options):
     import tracemalloc
 

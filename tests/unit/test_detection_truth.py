@@ -17,8 +17,9 @@ from keystab.detection.extrema import discrete_extrema
 from keystab.errors import InputError
 from keystab.io.pictures import write_picture
 from keystab.scalespace.dog import scale_space
+from keystab.scalespace.grid_kernels import cosine_domain_kernel
 from keystab.scalespace.sampling import balanced_delta
-from keystab.scalespace.spline_axis import SplineAxis, cosine_domain_kernel
+from keystab.scalespace.spline_axis import SplineAxis
 from keystab.truth.scene_extrema import scene_extrema
 from keystab.truth.true_extrema import true_extrema
 
@@ -216,8 +217,14 @@ def test_a_straight_edge_has_no_keypoints(oversampling):
     assert len(detect_keypoints(image, 0.5, 12, refine=False, oversampling=oversampling)) == 0
 
 
-@pytest.mark.parametrize("refine", [True, False])
-@pytest.mark.parametrize("n_spo", [3, 5])
+@pytest.mark.parametrize(
+    ("n_spo", "refine"),
+    [
+        (3, True),
+        *(pytest.param(*it, marks=pytest.mark.slow) for it in ((5, True), (3, False))),
+        (5, False),
+    ],
+)
 def test_no_extremum_is_lost_or_doubled_at_seams(n_spo, refine):
     """Blobs whose scales lie around two seams: one keypoint each."""
     around = np.linspace(-1.2, 2.2, 32) / n_spo

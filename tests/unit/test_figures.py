@@ -47,7 +47,14 @@ def folder(tmp_path, tables):
 
 
 # Embedding fonts takes longer than drawing, and is the same for all: most are written as drafts are.
-@pytest.mark.parametrize(("n", "draft"), [(2, False), *((n, True) for n in NUMBERS)])
+# Pixels, a surface, a grid and curves are drawn in different ways; of each one here.
+TWICE = [
+    (2, False),
+    *(pytest.param(n, True, marks=[pytest.mark.slow] * (n not in (3, 6, 12))) for n in NUMBERS),
+]
+
+
+@pytest.mark.parametrize(("n", "draft"), TWICE)
 def test_drawing_twice_writes_the_same_pdf(n, draft, modules, tables, drawn, tmp_path):
     save(drawn[n], tmp_path / "first.pdf", draft)
     with matplotlib.rc_context({"font.size": 20.0, "font.family": "serif", "pdf.fonttype": 3}):

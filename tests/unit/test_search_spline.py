@@ -1,8 +1,6 @@
-"""The search from few samples finds what the search of all samples finds, and its bound holds."""
+"""The search that looks where an extremum can be finds what the plain search of all samples finds."""
 
 from __future__ import annotations
-
-from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -10,52 +8,98 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import blobs
 
-from keystab.detection import extrema, search_cosine, search_spline
-from keystab.detection.search_cosine import BandLimitedSearch
-from keystab.detection.search_rows import axis_blocks
-from keystab.detection.search_scan import scan
-from keystab.detection.search_spline import InterpolatedSearch, applies, expansion
-from keystab.scalespace.dog import scale_space
+from keystab.detection import extrema, search_lattice
+from keystab.detection.search_lattice import LatticeSearch, node_distance
+from keystab.scalespace.dog import ScaleSpace, scale_space
 
 
-def both(image, n_spo, epsilon=0.0, camera_blur=1.1, **options):
-    """Extrema of the two searches."""
-    space = scale_space(image, camera_blur, n_spo, **options)
-    assert extrema.search_of_few(space)
-    with patch.object(extrema, "search_of_few", return_value=None):
-        dense = extrema.discrete_extrema(space, epsilon)
-    return extrema.discrete_extrema(space, epsilon), dense
+def of_all(space: ScaleSpace, tolerance: float) -> np.ndarray:
+    """Extrema among all samples."""
+    likely = extrema.extrema_of_array(space.window(), tolerance - space.rounding_bounds.between)
+    return extrema.decided(space, likely, tolerance)[0]
 
 
-def scene(kind: str) -> np.ndarray:
-    rng = np.random.default_rng(5)
-    image = blobs((31, 43), 1)
-    if kind == "noise":
-        return rng.random((31, 43))
+def of_few(space: ScaleSpace, tolerance: float, p: int | None = None) -> np.ndarray:
+    """Extrema that the search finds with nodes p samples apart."""
+    asked = extrema.inner_window(space)
+    search = LatticeSearch(space, tolerance, asked, p=p)
+    parts = [np.empty((0, 4), dtype=np.int64)]
+    parts += [extrema._found_by(search, part) for part in search.parts]
+    found = extrema.decided(space, np.concatenate(parts), tolerance)[0]
+    return found[extrema.within(found, asked)]
+
+
+def picture(kind: str, shape: tuple[int, int], seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    if kind == "blobs":
+        return blobs(shape, seed)
     if kind == "faint":
-        return 0.5 + 1e-9 * image
+        return 0.5 + 1e-9 * blobs(shape, seed)
+    if kind == "noise":
+        return rng.random(shape)
     if kind == "edge":
-        return (np.add.outer(np.arange(31), 2 * np.arange(43)) > 55).astype(float)
-    if kind == "flat and strong":
-        image[:, 20:] = 0.3
-        image[12:, 30:] = 0.3 + 1e-4 * image[12:, :13]
+        return (np.cos(seed) * (y - 11) + np.sin(seed) * (x - 12) > 0).astype(float)
+    if kind == "text":
+        letters = rng.random((-(-shape[0] // 4), -(-shape[1] // 3))) > 0.6
+        return 65535.0 * np.kron(letters, np.ones((4, 3)))[: shape[0], : shape[1]]
+    image = np.zeros(shape)
+    if kind == "impulse":
+        image[tuple(rng.integers(0, shape))] = 65535
+    if kind == "rectangles":
+        for value in rng.random(4):
+            (top, bottom), (left, right) = (np.sort(rng.integers(0, n, 2)) for n in shape)
+            image[top:bottom, left:right] = value
+    if kind == "strong beside faint":
+        image = 1e-4 * blobs(shape, seed)
+        image[: shape[0] // 3] += blobs(shape, seed + 1)[: shape[0] // 3]
     return image
 
 
-@pytest.mark.parametrize("kind", ["blobs", "noise", "faint", "edge", "flat and strong"])
-@pytest.mark.parametrize("n_spo", [12, 15])
-@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
-def test_every_extremum_is_found(kind, n_spo, oversampling):
-    found, dense = both(scene(kind), n_spo, oversampling=oversampling)
-    assert found.tolist() == dense.tolist()
-    assert len(dense) > (7 if kind == "blobs" else -1)
+KINDS = [
+    "blobs",
+    "faint",
+    "noise",
+    "edge",
+    "text",
+    "impulse",
+    "rectangles",
+    "strong beside faint",
+    "flat",
+]
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.sampled_from(KINDS),
+    st.integers(0, 10**6),
+    st.integers(20, 36),
+    st.integers(20, 36),
+    st.integers(3, 19),
+    st.sampled_from([0.0, 1.19e-7, 1e-5, 1e-3]),
+    st.integers(1, 6),
+    st.integers(0, 1),
+)
+def test_whatever_the_picture(kind, seed, height, width, n_spo, epsilon, p, octave):  # noqa: PLR0913
+    image = picture(kind, (height, width), seed)
+    space = scale_space(image, 1.1, n_spo, octave=octave)
+    tolerance = max(epsilon * np.ptp(image), space.rounding)
+    p = max(1, min(p, min(space.shape[1:]) // 10))
+    assert of_few(space, tolerance, p).tolist() == of_all(space, tolerance).tolist()
+
+
+@pytest.mark.parametrize("n_spo", range(3, 20))
+def test_all_samplings(n_spo):
+    space = scale_space(blobs((26, 30), n_spo), 1.1, n_spo)
+    plain = of_all(space, space.rounding)
+    assert len(plain) > 3
+    for p in {1, 1 + n_spo // 4}:
+        assert of_few(space, space.rounding, p).tolist() == plain.tolist()
 
 
 @pytest.mark.parametrize(
     "options",
     [
-        {"epsilon": 1.19e-7},
-        {"epsilon": 1e-5},
         {"kappa": 2**0.5},
         {"kappa": 2 ** (1 / 30)},
         {"camera_blur": 0.3},
@@ -65,138 +109,21 @@ def test_every_extremum_is_found(kind, n_spo, oversampling):
     ],
     ids=str,
 )
-@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
-def test_whatever_the_sampling(options, oversampling):
-    found, dense = both(blobs((58, 63), 2), 15, oversampling=oversampling, **options)
-    assert found.tolist() == dense.tolist()
-    assert len(dense) > 5
+def test_whatever_the_sampling(options):
+    space = scale_space(blobs((33, 38), 2), **{"camera_blur": 1.1, "n_spo": 15} | options)
+    plain = of_all(space, space.rounding)
+    assert of_few(space, space.rounding, 3).tolist() == plain.tolist()
+    assert len(plain) > 0
 
 
-@settings(max_examples=4, deadline=None)
-@given(
-    st.integers(0, 10**6),
-    st.integers(26, 40),
-    st.integers(26, 40),
-    st.sampled_from(["spline", "cosine"]),
-)
-def test_whatever_the_picture(seed, height, width, oversampling):
-    found, dense = both(blobs((height, width), seed), 14, oversampling=oversampling)
-    assert found.tolist() == dense.tolist()
-
-
-@pytest.mark.parametrize("factor", [1e39, 1e200])
-@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
-def test_values_beyond_single_precision_have_the_same_extrema(factor, oversampling):
-    image = blobs((31, 43), 1)
-    found, beyond = (
-        extrema.discrete_extrema(scale_space(scaled, 1.1, 12, oversampling=oversampling))
-        for scaled in (image, factor * image)
-    )
-    np.testing.assert_array_equal(beyond, found)
-
-
-@pytest.mark.parametrize(
-    ("x", "errors", "kept"),
-    [
-        (3, (0.0, 3.5), True),  # its right neighbour lies in the worse block
-        (4, (3.5, 0.0), True),
-        (2, (0.0, 3.5), False),
-        (5, (3.5, 0.0), False),
-    ],
-)
-def test_candidates_are_held_to_the_errors_of_the_blocks_they_touch(x, errors, kept):
-    dog = np.zeros((3, 3, 8), dtype=np.float32)
-    dog[0], dog[2] = -100.0, 100.0  # grows with scale, so that nothing else is extremal
-    dog[2, :, x - 1 : x + 2] = -100.0
-    dog[1, 1, x] = 50.0
-    dog[0, 1, x] = 51.9  # above it, as is possible where both are off by 3.5 and need differ by 5
-    found = np.empty((4, 4), dtype=np.int64)
-    assert scan(dog, np.array([errors] * 3), 5.0, 0, 0, found) == kept
-
-
-@pytest.mark.parametrize("off", [1e-4, 1e-7])
-def test_the_margin_of_a_comparison_is_on_the_safe_side(off):
-    # Errors above the tolerance: a candidate may fall short of its neighbours.
-    short = np.float32(2 * off - 1e-30)
-    dog = np.full((3, 3, 3), short, dtype=np.float32)
-    dog[1, 1, 1] = 0.0
-    assert scan(dog, np.full((3, 1), off), 0.0, 0, 0, np.empty((4, 4), dtype=np.int64)) == 1
-
-
-def test_a_constant_picture_has_none():
-    found, dense = both(np.full((30, 30), 0.7), 15)
-    assert len(found) == len(dense) == 0
-
-
-@pytest.mark.parametrize("kind", ["blobs", "noise", "edge"])
-@pytest.mark.parametrize("n_spo", [12, 15])
-def test_the_bound_holds_and_is_no_mere_caution(kind, n_spo):
-    space = scale_space(scene(kind), 1.1, n_spo)
-    search = InterpolatedSearch(space, 0.0, *extrema.inner_window(space))
-    blocks = [search.x_blocks(column) for column in range(search.n_columns)]
-    bounds = [search.error_bounds(abreast) for abreast in blocks]
-    lefts = np.concatenate([abreast.start for abreast in blocks])
-    dog = space.window()
-    nodes, expand = expansion(search.length)
-    reached = 0.0
-    for i, top in enumerate(search.y_blocks.start):
-        for j, left in enumerate(lefts):
-            box = dog[:, top : top + search.length, left : left + search.length]
-            interpolated = expand @ box[:, nodes][:, :, nodes] @ expand.T
-            off = np.abs(interpolated - box).max(axis=(1, 2))
-            bound = bounds[j // search_spline._ABREAST][i, :, j % search_spline._ABREAST]
-            assert (off <= bound + 1e-14).all()
-            reached = max(reached, (off / bound)[:4].max())
-    assert reached > 1e-3
-
-
-@pytest.mark.parametrize("n_blocks", [1, 7, 12])
-def test_rows_of_blocks_do_not_depend_on_the_threads_that_make_them(n_blocks):
-    axis = scale_space(scene("blobs"), 1.1, 12).axes[0]
-    starts = tuple(range(0, 5 * n_blocks, 5))
-    for one, three in zip(
-        axis_blocks(axis, starts, 26), axis_blocks(axis, starts, 26, threads=3), strict=True
-    ):
-        np.testing.assert_array_equal(one, three)
-
-
-@pytest.mark.parametrize("kind", ["blobs", "noise", "edge"])
-@pytest.mark.parametrize("n_spo", [12, 15])
-def test_the_bound_of_band_limited_interpolation_holds(kind, n_spo):
-    space = scale_space(scene(kind), 1.1, n_spo, oversampling="cosine")
-    search = BandLimitedSearch(space, 0.0, *extrema.inner_window(space))
-    dog = space.window()
-    (y_nodes, along), (x_nodes, across) = (
-        search_cosine.interpolation(length, space.sampling.step)
-        for length in (search.length, search.abreast)
-    )
-    reached = 0.0
-    for top in search.y_starts:
-        for left in search.x_starts:
-            box = dog[:, top : top + search.length, left : left + search.abreast]
-            interpolated = along @ box[:, y_nodes][:, :, x_nodes] @ across.T
-            off = np.abs(interpolated - box).max(axis=(1, 2))
-            assert (off <= search.bounds + 1e-14).all()
-            reached = max(reached, (off / search.bounds).max())
-    assert reached > 1e-3
-
-
-def test_blocks_with_too_many_candidates_are_evaluated(monkeypatch):
-    monkeypatch.setattr(search_spline, "_KINKED", 0.0)  # slice 1 is then all candidates
-    image = blobs((31, 43), 3)
-    found, dense = both(image, 15)
-    space = scale_space(image, 1.1, 15)
-    search = InterpolatedSearch(space, 1e-14, *extrema.inner_window(space))
-    assert any(search.candidates(column)[1] for column in range(search.n_columns))
-    assert found.tolist() == dense.tolist()
-
-
-def test_coarse_and_small_scale_spaces_are_not_interpolated():
-    image = blobs((40, 40), 4)
-    for oversampling, asked in (("spline", applies), ("cosine", search_cosine.applies)):
-        assert asked(scale_space(image, 1.1, 15, oversampling=oversampling))
-        assert not asked(scale_space(image, 1.1, 3, oversampling=oversampling))
-        assert not asked(scale_space(image[:9, :9], 1.1, 15, oversampling=oversampling))
+def test_extrema_on_the_lines_between_cells_are_found():
+    # Nodes at every p-th sample: extrema lie on rows and on columns of nodes, and on nodes.
+    space = scale_space(blobs((60, 66), 7, density=0.06), 1.1, 9)
+    plain = of_all(space, space.rounding)
+    for p in (2, 3, 4):
+        on_line = plain[:, 1:3] % p == 0
+        assert on_line.any(axis=0).all() and on_line.all(axis=1).any()
+        assert of_few(space, space.rounding, p).tolist() == plain.tolist()
 
 
 @pytest.mark.parametrize("n_spo", [5, 15])
@@ -204,7 +131,8 @@ def test_coarse_and_small_scale_spaces_are_not_interpolated():
     "part",
     [(0.2, 0.7, 0.1, 0.6), (-1.0, 2.0, 0.5, 3.0), (0.9, 1.0, 0.0, 1.0), (0.5, 0.5, 0.2, 0.9)],
 )
-def test_a_window_has_the_extrema_that_lie_in_it(n_spo, part):
+def test_a_window_has_the_extrema_that_lie_in_it(n_spo, part, monkeypatch):
+    monkeypatch.setattr(search_lattice, "_FEW", 0.0)
     space = scale_space(blobs((34, 47), 3), 1.1, n_spo)
     rows, columns = (
         slice(int(first * size), int(last * size))
@@ -213,7 +141,40 @@ def test_a_window_has_the_extrema_that_lie_in_it(n_spo, part):
     everywhere = extrema.discrete_extrema(space)
     inside = (everywhere[:, 1] >= rows.start) & (everywhere[:, 1] < rows.stop)
     inside &= (everywhere[:, 2] >= columns.start) & (everywhere[:, 2] < columns.stop)
-    found = extrema.discrete_extrema(space, window=(rows, columns))
+    found = extrema.discrete_extrema(space, window=(rows, columns), threads=2)
     assert found.tolist() == everywhere[inside].tolist()
     if part[1] - part[0] > 0.4:
         assert inside.any() and not inside.all()
+
+
+def test_many_candidates_are_left_to_an_evaluation_of_all():
+    # So far from an impulse, samples differ by less than single precision of it.
+    space = scale_space(picture("impulse", (24, 62), 0), 0.8, 9, sigma_min=1.6)
+    search = LatticeSearch(space, space.rounding, extrema.inner_window(space))
+    assert any(search.candidates(part)[1] for part in search.parts)
+    assert of_few(space, space.rounding).tolist() == of_all(space, space.rounding).tolist()
+
+
+def test_a_search_changes_nothing_that_samples_are_made_of():
+    for n_spo in (3, 9):
+        space = scale_space(blobs((24, 30), 1), 1.1, n_spo)
+        before = space.window()
+        LatticeSearch(space, 0.0, extrema.inner_window(space))
+        np.testing.assert_array_equal(space.window(), before)
+
+
+@pytest.mark.parametrize("factor", [1e29, 1e39, 1e200])
+def test_values_beyond_single_precision_have_the_same_extrema(factor):
+    image = blobs((31, 43), 1)
+    found, beyond = (
+        extrema.discrete_extrema(scale_space(scaled, 1.1, 9)) for scaled in (image, factor * image)
+    )
+    np.testing.assert_array_equal(beyond, found)
+    assert len(found) > 5
+
+
+def test_nodes_lie_further_apart_where_samples_are_finer():
+    image = np.zeros((225, 400))
+    distance = [node_distance(scale_space(image, 1.1, n)) for n in (3, 5, 9, 15, 19)]
+    assert distance == sorted(distance) and distance[0] == 1 and distance[-1] > 3
+    assert node_distance(scale_space(image[:9, :9], 1.1, 15)) == 1

@@ -21,7 +21,9 @@ def test_examples_of_tools(name, monkeypatch):
     assert tried and not failed
 
 
-@pytest.mark.parametrize("room", ["", "near/", "far/away/"])
+@pytest.mark.parametrize(
+    "room", [*(pytest.param(it, marks=pytest.mark.slow) for it in ("", "near/")), "far/away/"]
+)
 def test_loops_that_the_set_up_compiled_are_found_beside_their_module(room, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(TOOLS)
     package, loops = tmp_path / "toy", tmp_path / "loops"

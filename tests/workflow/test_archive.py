@@ -476,8 +476,8 @@ def test_the_real_study_is_finished_without_its_intermediate_files(touched, tmp_
     [
         ("fig5_auc.csv", "score_features"),  # is drawn
         ("fig5_features.csv", "score_features"),  # is drawn by no figure
-        ("predictors_detections.parquet", "score_predictors"),
-        ("refinement.csv", "count_refined"),
+        pytest.param("predictors_detections.parquet", "score_predictors", marks=pytest.mark.slow),
+        pytest.param("refinement.csv", "count_refined", marks=pytest.mark.slow),
     ],
 )
 def test_a_lost_table_that_cannot_be_packed_is_made_again(finished, table, rule):

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 
+import pytest
 from project import QUICK, ROOT, Project
 
 FIGURES = sorted((ROOT / "workflow/report").glob("*.rst"))
@@ -58,6 +59,7 @@ def test_all_of_a_run_in_one_file(finished):
     assert finished.would_run(*QUICK, "--forceall").keys() - {"all"} <= drawn
 
 
+@pytest.mark.slow
 def test_an_unfinished_run_has_no_report(finished):
     (finished.folder / "figures/quick/fig4.png").unlink()
     run, page = report(finished)

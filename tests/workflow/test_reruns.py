@@ -82,22 +82,26 @@ def test_edits_without_effect(finished):
     assert reruns(Project(finished.folder), "config/change.yaml") == set()
 
 
+def slow(*values):
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
 @pytest.mark.parametrize(
     ("name", "old", "new", "expected"),
     [
         ("src/keystab/detection/extrema.py", "def discrete_extrema(", "MORE = 1\n\n\ndef discrete_extrema(", DETECTION | BLOBS | TRUTHS | {"detect_blobs"}),
-        ("src/keystab/evaluation/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "evaluate_keypoints", "truth"} | PREDICTING | BARS),
-        ("src/keystab/stages/cut_cubes.py", "    unique = ", "    MORE = 1\n    unique = ", {"cut_cubes", "fig6"}),
+        slow("src/keystab/evaluation/roc.py", "from __future__ import annotations", "from __future__ import annotations\nMORE = 1", {"score_features", "fig5", "evaluate_keypoints", "truth"} | PREDICTING | BARS),
+        slow("src/keystab/stages/cut_cubes.py", "    unique = ", "    MORE = 1\n    unique = ", {"cut_cubes", "fig6"}),
         ("src/keystab/figures/palette.py", '"condition": "#A8458A"', '"condition": "#A8458B"', {"fig5"}),
-        ("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
-        ("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
+        slow("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
+        slow("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
         ("src/keystab/camera/simulation.py", *MORE, SIMULATION),
         # The contract for code: what depends on it, and nothing else.
         ("src/keystab/evaluation/intervals.py", *MORE, (MATCHING | EVALUATING | BARS) - KAPPAS),
         ("src/keystab/evaluation/recall_precision.py", *MORE, EVALUATING),
         ("src/keystab/detection/sift_filters.py", *MORE, {"match_sift", "fig7"}),
         ("src/keystab/utils/validation.py", *MORE, EVERYTHING - {"simulate", "describe_views", "semigroup", "crop_views", "fig1", "fig2"}),
-        ("src/keystab/parameters.py", "        str | None, Setting(\"reference_sha256\"", "        None | str, Setting(\"reference_sha256\"", SIMULATION),
+        slow("src/keystab/parameters.py", "        str | None, Setting(\"reference_sha256\"", "        None | str, Setting(\"reference_sha256\"", SIMULATION),
         ("environment.lock", "numpy==", "numpy==99.", EVERYTHING),
     ],
 )  # fmt: skip

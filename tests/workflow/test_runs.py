@@ -86,8 +86,9 @@ logs: logs/tiny
 """
 
 
-# Sweeps take the same rule of detection as zooms, and test_sweep_stages has their tables.
-@pytest.mark.parametrize("figure", ["fig8", pytest.param("fig11", marks=pytest.mark.slow)])
+# That what is stored is what is streamed is also tried above, and of stages in test_stages.
+@pytest.mark.slow
+@pytest.mark.parametrize("figure", ["fig8", "fig11"])
 def test_tables_of_sets_depend_on_neither_cores_nor_stores(figure, tmp_path):
     written = {}
     for how, keep, cores in (("streamed", "false", "1"), ("stored", "true", "2")):

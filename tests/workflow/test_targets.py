@@ -56,7 +56,10 @@ def test_any_sampling_can_be_stored_or_streamed(project, keep, stored):
     assert not any("--store" in line for line in set(commands) - set(own))
 
 
-@pytest.mark.parametrize("overlay", sorted((ROOT / "config/what_if").glob("*.yaml")), ids=str)
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "overlay", sorted((ROOT / "config/what_if").glob("*.yaml")), ids=lambda path: path.stem
+)
 def test_what_ifs_can_be_planned(planned, overlay):
     jobs = planned.would_run("--configfile", f"config/what_if/{overlay.name}")
     assert jobs["fig6"] == 1

@@ -13,7 +13,7 @@ from keystab.detection.refinement import (
     HESSIAN_COLUMNS,
     MOST_MODELS,
     MOVES,
-    positions,
+    positions_of,
     quadratic_model,
     refined_table,
     stationary_point,
@@ -156,8 +156,13 @@ def detect_keypoints(
     keep = without_seams(octaves, n_spo, sigma_min)
     names = ["y", "x", "sigma", "value", "sign", "octave", "s", "row", "column", "difference"]
     names += ["models"] if refine else []
-    kept = [table.loc[mask, names] for table, mask in zip(octaves, keep, strict=True)]
-    return pd.concat(kept, ignore_index=True)
+    kept = {
+        name: np.concatenate(
+            [table[name].to_numpy()[mask] for table, mask in zip(octaves, keep, strict=True)]
+        )
+        for name in names
+    }
+    return pd.DataFrame(kept)
 
 
 def number_of_octaves(n_oct: int | str, shape: tuple[int, ...], sigma_min: float) -> int:
@@ -213,9 +218,7 @@ def extrema_table(
         np.minimum(difference, np.abs(around - value), out=difference)
     gradient, hessian = quadratic_model(cubes)
     alpha = stationary_point(gradient, hessian)
-    offsets = dict(zip(("alpha_s", "alpha_y", "alpha_x"), alpha.T, strict=True))
-    models = pd.DataFrame({"s": s, "row": row, "column": column, **offsets})
-    step = positions(models, space.sampling)
+    step = positions_of((s, row, column), alpha.T, space.sampling)
     return pd.DataFrame(
         {
             "y": row * space.sampling.step,
@@ -229,7 +232,7 @@ def extrema_table(
             "difference": difference,
             **{name: gradient[:, i] for name, i in GRADIENT_COLUMNS.items()},
             **{name: hessian[:, i, j] for name, (i, j) in HESSIAN_COLUMNS.items()},
-            **{f"step_{name}": step[name] for name in ("y", "x", "sigma")},
+            **{f"step_{name}": place for name, place in step.items()},
             "step_value": value + 0.5 * np.einsum("ni,ni->n", gradient, alpha),
         }
     )

@@ -22,7 +22,7 @@ import threadpoolctl
 from numba import njit
 
 from keystab.detection.search_cosine import BandLimitedSearch
-from keystab.detection.search_spline import InterpolatedSearch
+from keystab.detection.search_lattice import LatticeSearch
 from keystab.errors import InputError
 from keystab.scalespace.axis import Block
 from keystab.scalespace.dog import ScaleSpace, ranges
@@ -42,8 +42,8 @@ BAND_ROWS = 8192
 # where all samples are evaluated.
 MOST_SAMPLES = 10**12
 
-SearchOfFew = type[InterpolatedSearch] | type[BandLimitedSearch]
-_SEARCHES: dict[str, SearchOfFew] = {"spline": InterpolatedSearch, "cosine": BandLimitedSearch}
+SearchOfFew = type[LatticeSearch] | type[BandLimitedSearch]
+_SEARCHES: dict[str, SearchOfFew] = {"spline": LatticeSearch, "cosine": BandLimitedSearch}
 
 Decided = tuple[np.ndarray, np.ndarray]
 """Extrema, shape (n, 4), and their cubes of samples, shape (n, 3, 3, 3)."""
@@ -180,37 +180,36 @@ def _searches(
     threads: int,
     window: tuple[slice, slice],
 ) -> Iterator[tuple[Callable[[Any], np.ndarray], Sequence[Any]]]:
-    """What finds the candidates of a column of blocks, and the columns, band by band."""
+    """What finds the candidates of parts of the samples, and the parts, band by band."""
     columns = list(ranges(window[1].start, window[1].stop, BLOCK_COLUMNS))
-    bands = list(ranges(window[0].start, window[0].stop, BAND_ROWS))
     search = search_of_few(space)
-    for top, bottom in bands:
+    for top, bottom in ranges(window[0].start, window[0].stop, BAND_ROWS):
         if search is not None:
-            few = search(
-                space, tolerance, slice(top, bottom), window[1], threads, keep=len(bands) == 1
-            )
-            yield partial(_interpolated, few), range(few.n_columns)
+            few = search(space, tolerance, (slice(top, bottom), window[1]), threads)
+            yield partial(_found_by, few), few.parts
         else:
             rows = list(ranges(top, bottom, BLOCK_ROWS))
             along = list(pool.map(lambda r: space.axes[0].block(r[0] - 1, r[1] + 1), rows))
             yield partial(_evaluated, space, rows, along, tolerance), columns
 
 
-def _interpolated(search: InterpolatedSearch | BandLimitedSearch, column: int) -> np.ndarray:
-    """Candidates of one column of blocks, from few samples and a bound on what lies between."""
-    space = search.space
-    candidates, undecided = search.candidates(column)
-    dense = [
-        extrema_of_array(
-            space.window(
-                slice(None), slice(top, top + search.length), slice(left, left + search.abreast)
-            ),
-            search.tolerance - space.rounding / 2,
-            (top, left),
-        )
-        for top, left in undecided
-    ]
+def _found_by(search: LatticeSearch | BandLimitedSearch, part: Any) -> np.ndarray:
+    """Candidates of one part, from few samples and a bound on what lies between."""
+    candidates, undecided = search.candidates(part)
+    dense = [_of_region(search.space, search.tolerance, *region) for region in undecided]
     return np.concatenate([candidates, *dense])
+
+
+def _of_region(space: ScaleSpace, tolerance: float, rows: slice, columns: slice) -> np.ndarray:
+    """Candidates among all samples of a region, which may extend beyond the grid."""
+    (top, bottom), (left, right) = (
+        (max(part.start - 1, 0), min(part.stop + 1, n))
+        for part, n in zip((rows, columns), space.shape[1:], strict=True)
+    )
+    if bottom - top < 3 or right - left < 3:
+        return np.empty((0, 4), dtype=np.int64)
+    dog = space.window(slice(None), slice(top, bottom), slice(left, right))
+    return extrema_of_array(dog, tolerance - space.rounding_bounds.between, (top, left))
 
 
 def _evaluated(
@@ -225,7 +224,7 @@ def _evaluated(
     blocks = space.blocks(along, (first, last), (0, space.shape[0]))
     return np.concatenate(
         [
-            extrema_of_array(dog, tolerance - space.rounding / 2, (top - 1, first))
+            extrema_of_array(dog, tolerance - space.rounding_bounds.between, (top - 1, first))
             for (top, _), dog in zip(rows, blocks, strict=True)
         ]
     )

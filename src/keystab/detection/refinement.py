@@ -9,10 +9,12 @@ neighbours; its extremum lies at ``alpha = -H^{-1} g`` grid steps. It is accepte
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from keystab.errors import InputError
 from keystab.scalespace.sampling import Sampling
@@ -142,7 +144,8 @@ def trace(
     it has seen, since from there it only repeats itself.
     """
     _check(move, max_offset, max_models)
-    here = extrema[["s", "row", "column"]].to_numpy(np.int64)
+    here = np.stack([extrema[name].to_numpy() for name in ("s", "row", "column")], axis=1)
+    here = here.astype(np.int64)
     centre, gradient, hessian = _first_model(extrema)
     keypoint = np.arange(here.shape[0])
     seen: list[np.ndarray] = []
@@ -155,17 +158,7 @@ def trace(
             gradient, hessian = quadratic_model(cubes)
         alpha = stationary_point(gradient, hessian)
         value = centre + 0.5 * np.einsum("ni,ni->n", gradient, alpha)
-        parts.append(
-            pd.DataFrame(
-                {
-                    "keypoint": keypoint,
-                    "model": model,
-                    **dict(zip(("s", "row", "column"), here.T, strict=True)),
-                    **dict(zip(("alpha_s", "alpha_y", "alpha_x"), alpha.T, strict=True)),
-                    "value": value,
-                }
-            )
-        )
+        parts.append((keypoint, np.full(keypoint.size, model), here, alpha, value))
         step = _step(alpha, max_offset, move)
         if not scale_moves:
             step[:, 0] = 0
@@ -179,8 +172,19 @@ def trace(
             break
         keypoint, here = keypoint[goes_on], there[goes_on]
         seen = [earlier[goes_on] for earlier in seen]
-    table = pd.concat(parts, ignore_index=True)
-    return table.sort_values(["keypoint", "model"], ignore_index=True)
+    # One table at the end: each takes longer than some hundred models.
+    of, number, place, alpha, value = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.lexsort((number, of))
+    place, alpha = place[order], alpha[order]
+    return pd.DataFrame(
+        {
+            "keypoint": of[order],
+            "model": number[order],
+            **dict(zip(("s", "row", "column"), place.T, strict=True)),
+            **dict(zip(("alpha_s", "alpha_y", "alpha_x"), alpha.T, strict=True)),
+            "value": value[order],
+        }
+    )
 
 
 def accepted(trace: pd.DataFrame, max_offset: float, max_iterations: float) -> pd.DataFrame:
@@ -201,9 +205,18 @@ def accepted(trace: pd.DataFrame, max_offset: float, max_iterations: float) -> p
         The rows of `trace` of the first model of each keypoint with ``max|alpha| < max_offset``
         among its first `max_iterations`; keypoints without one are discarded.
     """
-    offset = trace[["alpha_s", "alpha_y", "alpha_x"]].abs().max(axis=1, skipna=False)
-    good = trace[(offset < max_offset) & (trace["model"] <= max_iterations)]
-    return good.drop_duplicates("keypoint", keep="first").reset_index(drop=True)
+    return trace.iloc[_first_accepted(trace, max_offset, max_iterations)].reset_index(drop=True)
+
+
+def _first_accepted(
+    trace: pd.DataFrame, max_offset: float, max_iterations: float
+) -> NDArray[np.int64]:
+    """Rows of a trace at which keypoints are accepted, in their order."""
+    alpha = (np.abs(trace[name].to_numpy()) for name in ("alpha_s", "alpha_y", "alpha_x"))
+    good = np.max(list(alpha), axis=0) < max_offset  # of what is not a number, none is less
+    good &= trace["model"].to_numpy() <= max_iterations
+    rows = np.flatnonzero(good)
+    return np.sort(rows[np.unique(trace["keypoint"].to_numpy()[rows], return_index=True)[1]])
 
 
 def positions(models: pd.DataFrame, sampling: Sampling) -> pd.DataFrame:
@@ -211,24 +224,32 @@ def positions(models: pd.DataFrame, sampling: Sampling) -> pd.DataFrame:
 
     The refined scale is geometric, ``sigma_s * 2**(alpha_s / n_spo)``.
     """
-    scale = sampling.sigma[models["s"].to_numpy()]
+    place = [models[name].to_numpy() for name in ("s", "row", "column")]
+    alpha = [models[name].to_numpy() for name in ("alpha_s", "alpha_y", "alpha_x")]
+    return pd.DataFrame(positions_of(place, alpha, sampling))
+
+
+def positions_of(
+    place: Sequence[np.ndarray] | np.ndarray,
+    alpha: Sequence[np.ndarray] | np.ndarray,
+    sampling: Sampling,
+) -> dict[str, np.ndarray]:
+    """As `positions`, from samples s, row, column and the offsets of models to them."""
     with np.errstate(over="ignore"):
-        sigma = scale * 2.0 ** (models["alpha_s"].to_numpy() / sampling.n_spo)
-    return pd.DataFrame(
-        {
-            "y": (models["row"] + models["alpha_y"]) * sampling.step,
-            "x": (models["column"] + models["alpha_x"]) * sampling.step,
-            "sigma": sigma,
-        }
-    )
+        sigma = sampling.sigma[place[0]] * 2.0 ** (alpha[0] / sampling.n_spo)
+    return {
+        "y": (place[1] + alpha[1]) * sampling.step,
+        "x": (place[2] + alpha[2]) * sampling.step,
+        "sigma": sigma,
+    }
 
 
 def _first_model(extrema: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Value, gradient and Hessian at the discrete extrema, from their table."""
     hessian = np.empty((len(extrema), 3, 3))
     for name, (i, j) in HESSIAN_COLUMNS.items():
-        hessian[:, i, j] = hessian[:, j, i] = extrema[name]
-    gradient = extrema[list(GRADIENT_COLUMNS)].to_numpy()
+        hessian[:, i, j] = hessian[:, j, i] = extrema[name].to_numpy()
+    gradient = np.stack([extrema[name].to_numpy() for name in GRADIENT_COLUMNS], axis=1)
     return extrema["value"].to_numpy(), gradient, hessian
 
 
@@ -277,11 +298,21 @@ def refined_table(
         ``difference`` of the discrete extremum, the number of ``models``, and ``keypoint``, the
         row in `extrema`.
     """
-    good = accepted(models, max_offset, max_iterations)
+    rows = _first_accepted(models, max_offset, max_iterations)
+    good = {name: column.to_numpy()[rows] for name, column in models.items()}
+    of = good["keypoint"]
     names = ["sign", "s", "row", "column", "difference"]
-    origin = extrema[names].iloc[good["keypoint"].to_numpy()].reset_index(drop=True)
-    counts = {"models": good["model"], "keypoint": good["keypoint"]}
-    return positions(good, sampling).assign(value=good["value"], **origin, **counts)
+    place = [good[name] for name in ("s", "row", "column")]
+    alpha = [good[name] for name in ("alpha_s", "alpha_y", "alpha_x")]
+    return pd.DataFrame(
+        {
+            **positions_of(place, alpha, sampling),
+            "value": good["value"],
+            **{name: extrema[name].to_numpy()[of] for name in names},
+            "models": good["model"],
+            "keypoint": of,
+        }
+    )
 
 
 def refined_keypoints(

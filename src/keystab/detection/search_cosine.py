@@ -3,9 +3,8 @@ r"""Search of a finely sampled cosine scale-space from few of its samples.
 A cosine series has no frequency above half a cycle per pixel. On the few pixels that a block of
 fine samples spans, such functions form a space of few dimensions, so that their values at as many
 *nodes* give all others: rows L of the axis are E N, with N the rows at the nodes and E the same
-matrix for all blocks of one length. As in `keystab.detection.search_spline`, samples are expanded
-from the nodes in single precision, how far they can be off is bounded, and what may be an extremum
-is decided exactly by the caller.
+matrix for all blocks of one length. Samples are expanded from the nodes in single precision, how
+far they can be off is bounded, and what may be an extremum is decided exactly by the caller.
 
 **Bound.** With C the coefficients and R = L - E N, whose entry of frequency k is at most r_k in
 any row of any block,
@@ -18,7 +17,6 @@ once the gains of the Gaussian are put into C.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
@@ -35,7 +33,7 @@ from keystab.detection.search_scan import (
     scan,
     starts_of,
 )
-from keystab.scalespace.cosine_axis import CosineAxis, band_limited_basis
+from keystab.scalespace.cosine_axis import CosineAxis
 from keystab.scalespace.dog import ScaleSpace
 
 # Rows and columns of a block: long ones need fewer nodes per sample; all slices and the Gaussians
@@ -44,6 +42,9 @@ _ROWS, _COLUMNS = 48, 192
 
 # Waves of an interval that are weaker than this, of the strongest, are left to the bound.
 _FAINT = 1e-9
+
+# How far cosines of large angles are off, and sums of them; far below what is left to the bound.
+_ANGLES = 1e-12
 
 
 def applies(space: ScaleSpace) -> bool:
@@ -92,8 +93,37 @@ def interpolation(
     return nodes, np.ascontiguousarray(np.linalg.solve(basis[nodes].T, basis.T).T)
 
 
+@lru_cache(maxsize=16)
+def band_limited_basis(n_samples: int, spacing: float, faint: float) -> NDArray[np.float64] | None:
+    """Orthonormal basis of band-limited functions on an interval.
+
+    Parameters
+    ----------
+    n_samples : int
+        Samples of the interval.
+    spacing : float
+        Their distance in pixels; the band limit is half a cycle per pixel.
+    faint : float
+        Singular value, of the largest, below which a direction is left out.
+
+    Returns
+    -------
+    ndarray, shape (n_samples, rank), or None
+        Columns that span every such function; None where that takes
+        about as many as there are samples.
+    """
+    span = (n_samples - 1) * spacing
+    # Frequencies dense enough that the waves between them add nothing new to the interval.
+    frequency = np.linspace(0.0, np.pi, int(4 * span) + 64)
+    phase = np.multiply.outer((np.arange(n_samples) - (n_samples - 1) / 2) * spacing, frequency)
+    waves = np.hstack([np.cos(phase), np.sin(phase)])
+    left, singular, _ = np.linalg.svd(waves, full_matrices=False)
+    rank = int((singular > faint * singular[0] * np.sqrt(n_samples)).sum())
+    return np.ascontiguousarray(left[:, :rank]) if rank < 0.7 * n_samples else None
+
+
 class BandLimitedSearch:
-    """Candidates for extrema; used as `keystab.detection.search_spline.InterpolatedSearch`."""
+    """Candidates for extrema; used as `keystab.detection.search_lattice.LatticeSearch`."""
 
     length, abreast = _ROWS, _COLUMNS
 
@@ -111,12 +141,10 @@ class BandLimitedSearch:
         self,
         space: ScaleSpace,
         tolerance: float,
-        rows: slice,
-        columns: slice,
+        window: tuple[slice, slice],
         threads: int = 1,
-        keep: bool = True,
     ) -> None:
-        # Rows are made at once, and are the same for all blurs: there is nothing to share or keep.
+        rows, columns = window
         self.space, self.tolerance = space, tolerance
         self.y_starts = np.array(starts_of(rows, space.shape[1], self.length), dtype=np.int64)
         self.x_starts = starts_of(columns, space.shape[2], self.abreast)
@@ -132,8 +160,8 @@ class BandLimitedSearch:
     def _bounds(self) -> NDArray[np.float64]:
         """Bound of the interpolation error of every slice."""
         y_axis, x_axis, magnitude = self.y_axis, self.x_axis, np.abs(self.space.source)
-        r_y = _largest_residual(y_axis, self.y_starts, self.y_nodes, self.y_expand)
-        r_x = _largest_residual(x_axis, self.x_starts, self.x_nodes, self.x_expand)
+        r_y = _largest_residual(y_axis, self.y_nodes, self.y_expand)
+        r_x = _largest_residual(x_axis, self.x_nodes, self.x_expand)
         bound = np.array(
             [
                 (r_y * g_y) @ magnitude @ g_x + ((1 + r_y) * g_y) @ magnitude @ (r_x * g_x)
@@ -144,11 +172,11 @@ class BandLimitedSearch:
         return bound[lower] + bound[upper]
 
     @property
-    def n_columns(self) -> int:
+    def parts(self) -> range:
         """Columns of blocks."""
-        return len(self.x_starts)
+        return range(len(self.x_starts))
 
-    def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[int, int]]]:
+    def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[slice, slice]]]:
         """Samples of one column of blocks that may be extrema; see `gathered`."""
         _, lower, upper = self.space.blurs
         y_axis, x_axis, source = self.y_axis, self.x_axis, self.space.source
@@ -174,14 +202,19 @@ class BandLimitedSearch:
             upper,
             self.y_expand.astype(np.float32),
             np.ascontiguousarray(self.x_expand.T.astype(np.float32)),
-            self.bounds + self.space.rounding,
+            self.bounds + 2 * self.space.rounding_bounds.value,
             rounding,
             self.tolerance,
             left,
             found,
             counts,
         )
-        return gathered(found, counts, self.y_starts, left)
+        candidates, undecided = gathered(found, counts, self.y_starts, left)
+        inner = [
+            (slice(y + 1, y + self.length - 1), slice(x + 1, x + self.abreast - 1))
+            for y, x in undecided
+        ]
+        return candidates, inner
 
 
 def _of(space: ScaleSpace, n_samples: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -192,17 +225,17 @@ def _of(space: ScaleSpace, n_samples: int) -> tuple[NDArray[np.int64], NDArray[n
 
 
 def _largest_residual(
-    axis: CosineAxis,
-    starts: Iterable[int],
-    nodes: NDArray[np.int64],
-    expand: NDArray[np.float64],
+    axis: CosineAxis, nodes: NDArray[np.int64], expand: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Largest entry of L - E N of each frequency, for all blocks of an axis."""
-    largest = np.zeros(axis.n_pixels)
-    for start in starts:
-        rows = axis.basis(start + np.arange(len(expand)))
-        np.maximum(largest, np.abs(rows - expand @ rows[nodes]).max(axis=0), out=largest)
-    return largest
+    """Largest entry of L - E N of each frequency, wherever a block begins.
+
+    A block further on sees another phase: a mixture of the cosine and the sine.
+    """
+    angle = np.pi / axis.n_pixels * axis.spacing
+    phase = np.multiply.outer(np.arange(len(expand)), angle * np.arange(axis.n_pixels))
+    waves = (np.cos(phase), np.sin(phase))
+    residual = np.hypot(*(wave - expand @ wave[nodes] for wave in waves))
+    return residual.max(axis=0) + _ANGLES
 
 
 @njit(cache=True, nogil=True)
@@ -230,13 +263,13 @@ def _search(  # noqa: PLR0913
     nodes = np.empty((n_along, n_across), dtype=np.float32)
     half = np.empty((n_along, x_expand_t.shape[1]), dtype=np.float32)
     dog = np.empty((n_slices, n_rows, x_expand_t.shape[1]), dtype=np.float32)
-    error = np.empty((n_slices, 1))
+    error = np.empty(n_slices)
     for i in range(starts.size):
         np.dot(y_rows[i], side_by_side, gaussians)
         each = gaussians.reshape(n_along, n_blurs, n_across)
         for s in range(n_slices):
             largest = difference(each[:, upper[s]], each[:, lower[s]], nodes)
-            error[s, 0] = bounds[s] + rounding * largest
+            error[s] = bounds[s] + rounding * largest
             np.dot(nodes, x_expand_t, half)
             np.dot(y_expand, half, dog[s])
         counts[i] = scan(dog, error, tolerance, starts[i], left, found[i])

@@ -1,7 +1,7 @@
 """Blocks of interpolated samples: where they lie, and the scan for what may be an extremum there.
 
-Shared by the searches that evaluate few samples and interpolate the others in single precision
-(`keystab.detection.search_spline`, `keystab.detection.search_cosine`).
+For the search that interpolates most of its samples in single precision
+(`keystab.detection.search_cosine`).
 """
 
 from __future__ import annotations
@@ -85,19 +85,17 @@ def difference(high, low, out):
 
 @njit(cache=True, nogil=True)
 def scan(dog, error, tolerance, top, left, found):
-    """Write samples that may be extrema, given how far each slice may be off in each block abreast.
+    """Write samples that may be extrema, given how far each slice may be off.
 
     Few rows hold one that exceeds, or falls short of, its four neighbours in the slice, and almost
     none one that does so in scale as well. Both are asked of whole rows without a branch, which the
     compiler turns into vector instructions; only then a row is looked at sample by sample.
     """
     n_slices, n_rows, n_columns = dog.shape
-    n_blocks = error.shape[1]
-    length = n_columns // n_blocks
     count = 0
-    slack, slack_x = np.empty(3, dtype=np.float32), np.empty(3, dtype=np.float32)
+    slack = np.empty(3, dtype=np.float32)
     for s in range(1, n_slices - 1):
-        _set_slack(slack, tolerance, error, s, 0, n_blocks)
+        _set_slack(slack, tolerance, error, s)
         slack_f, slack_h, slack_c = slack
         for y in range(1, n_rows - 1):
             here, above, below = dog[s, y], dog[s, y - 1], dog[s, y + 1]
@@ -140,11 +138,7 @@ def scan(dog, error, tolerance, top, left, found):
             if not in_scale:
                 continue
             for x in range(1, n_columns - 1):
-                if not _may_be(dog, s, y, x, slack):
-                    continue
-                # Blocks at the border of the image may be off by far more than those beside them.
-                _set_slack(slack_x, tolerance, error, s, (x - 1) // length, (x + 1) // length + 1)
-                if _may_be(dog, s, y, x, slack_x):
+                if _may_be(dog, s, y, x, slack):
                     if count < found.shape[0]:
                         found[count, 0] = s
                         found[count, 1] = top + y
@@ -155,14 +149,13 @@ def scan(dog, error, tolerance, top, left, found):
 
 
 @njit(cache=True, nogil=True)
-def _set_slack(slack, tolerance, error, s, first, last):
+def _set_slack(slack, tolerance, error, s):
     """Write by how much at least samples differ, in three slices, where exact ones do sufficiently.
 
     A little less, for the rounding of the comparison.
     """
-    here = error[s, first:last].max()
     for ds in range(3):
-        least = tolerance - here - error[s - 1 + ds, first:last].max()
+        least = tolerance - error[s] - error[s - 1 + ds]
         slack[ds] = least - 1e-6 * abs(least) - 1e-30
 
 

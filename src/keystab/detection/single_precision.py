@@ -50,10 +50,6 @@ def single_precision_window(
             top, first = along.first[blur], across.first[blur]
             source = space.source[top : top + left.shape[1], first : first + right.shape[1]]
             blurred = left @ source @ right.T
-            if along.expand is not None:
-                blurred = along.expand @ blurred
-            if across.expand is not None:
-                blurred = blurred @ across.expand.T
             # The source is without the mean, which every Gaussian keeps.
             gaussians.append(((blurred + space.image.mean()) * grey_range).astype(np.float32))
     return np.stack([gaussians[b] - gaussians[a] for a, b in zip(lower, upper, strict=True)])

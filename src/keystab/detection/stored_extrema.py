@@ -47,7 +47,9 @@ def stored_extrema(
         rows = store.window(rows=slice(top, min(top + TILE, n_rows)))
         rows = np.concatenate([above, rows], axis=1)
         found.append(
-            extrema_of_array(rows, tolerance - space.rounding / 2, (top - above.shape[1], 0))
+            extrema_of_array(
+                rows, tolerance - space.rounding_bounds.between, (top - above.shape[1], 0)
+            )
         )
         above = rows[:, -2:].copy()
     return decided(space, np.concatenate(found), tolerance)[0]

@@ -24,15 +24,13 @@ class AxisOperator(Protocol):
 
 
 class Block(NamedTuple):
-    """Rows of L for a range of fine samples, ``L(blur) = expand @ factor(blur)``.
+    """Rows of L for a range of fine samples, ``factor(blur)``.
 
     The factors of all blurs lie one behind the other in memory, so that compiled code can go
     through them.
 
     Attributes
     ----------
-    expand : ndarray, shape (n_rows, rank), or None
-        What all blurs have in common; None stands for the identity.
     rank : int
         Rows of every factor.
     first : ndarray of int, shape (n_blurs,)
@@ -43,19 +41,18 @@ class Block(NamedTuple):
         Entries of all factors, row by row.
     """
 
-    expand: np.ndarray | None
     rank: int
     first: np.ndarray
     offset: np.ndarray
     entries: np.ndarray
 
     @classmethod
-    def of(cls, expand: np.ndarray | None, first: list[int], factors: list[np.ndarray]) -> Block:
+    def of(cls, first: list[int], factors: list[np.ndarray]) -> Block:
         """Put factors of one height behind each other."""
         sizes = [factor.size for factor in factors]
         offset = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
         entries = np.concatenate([factor.ravel() for factor in factors])
-        return cls(expand, len(factors[0]), np.array(first, dtype=np.int64), offset, entries)
+        return cls(len(factors[0]), np.array(first, dtype=np.int64), offset, entries)
 
     def factor(self, blur: int) -> np.ndarray:
         """Factor of one blur, shape (rank, n_columns)."""

@@ -6,12 +6,11 @@ Gaussian. Rows are not local: a column is a frequency.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from keystab.scalespace import cosine_series
 from keystab.scalespace.axis import Block
+from keystab.scalespace.rounding import UNIT
 
 
 class CosineAxis:
@@ -32,20 +31,13 @@ class CosineAxis:
         self.n_frequencies = np.array([cosine_series.significant(n_pixels, blur) for blur in blurs])
 
     def block(self, start: int, stop: int) -> Block:
-        """See `keystab.scalespace.axis.AxisOperator.block`; the columns are the lowest frequencies.
-
-        On a short interval, functions with a band limit of half a cycle per pixel span a space
-        of few dimensions, about one per pixel and a dozen more. Its basis is the same for all
-        blocks of one length.
-        """
-        expand = band_limited_basis(stop - start, self.spacing)
+        """See `keystab.scalespace.axis.AxisOperator.block`; columns are the lowest frequencies."""
         rows = self.basis(np.arange(start, stop))
-        common = rows if expand is None else expand.T @ rows
         factors = [
-            common[:, :count] * gain[:count]
+            rows[:, :count] * gain[:count]
             for count, gain in zip(self.n_frequencies, self.gains, strict=True)
         ]
-        return Block.of(expand, [0] * len(factors), factors)
+        return Block.of([0] * len(factors), factors)
 
     def basis(self, rows: np.ndarray, count: int | None = None) -> np.ndarray:
         """Cosines of the lowest frequencies at fine samples, shape rows.shape + (count,)."""
@@ -54,35 +46,43 @@ class CosineAxis:
 
 def cosine_source(image: np.ndarray) -> np.ndarray:
     """Cosine series coefficients of an image, without the constant term."""
-    a = cosine_series.coefficients(image)
+    a = cosine_series.coefficients(image - image.mean())  # what is rounded does not see the mean
     a[0, 0] = 0.0
     return a
 
 
-@lru_cache(maxsize=16)
-def band_limited_basis(n_samples: int, spacing: float, faint: float = 1e-16) -> np.ndarray | None:
-    """Orthonormal basis of band-limited functions on an interval.
+def rounding_of_gaussians(
+    source: np.ndarray, amplitude: float, axes: tuple[CosineAxis, CosineAxis], blurs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    r"""Bounds for Gaussians of a cosine series, see `keystab.scalespace.rounding.Rounding`.
+
+    Sizes of products are summed with the frequencies damped and all cosines taken for 1. The cosine
+    of frequency k is off by :math:`\pi k` units, because its angle is so large, and some more; a
+    transform of N numbers by :math:`10 \log_2 N` units of the root of their sum of squares.
 
     Parameters
     ----------
-    n_samples : int
-        Samples of the interval.
-    spacing : float
-        Their distance in pixels; the band limit is half a cycle per pixel.
-    faint : float
-        Singular value, of the largest, below which a direction is left out.
+    source : ndarray, shape (height, width)
+    amplitude : float
+        Largest distance of the image from its mean.
+    axes : (CosineAxis, CosineAxis)
+    blurs : ndarray of int, shape (n,)
+        Gaussians, by their number.
 
     Returns
     -------
-    ndarray, shape (n_samples, rank), or None
-        Columns that span every such function, by default to the last digit; None where that takes
-        about as many as there are samples.
+    value, sums : ndarray, shape (n,)
     """
-    span = (n_samples - 1) * spacing
-    # Frequencies dense enough that the waves between them add nothing new to the interval.
-    frequency = np.linspace(0.0, np.pi, int(4 * span) + 64)
-    phase = np.multiply.outer((np.arange(n_samples) - (n_samples - 1) / 2) * spacing, frequency)
-    waves = np.hstack([np.cos(phase), np.sin(phase)])
-    left, singular, _ = np.linalg.svd(waves, full_matrices=False)
-    rank = int((singular > faint * singular[0] * np.sqrt(n_samples)).sum())
-    return np.ascontiguousarray(left[:, :rank]) if rank < 0.7 * n_samples else None
+    size, n_all = np.abs(source), sum(source.shape)
+    transform = 10 * np.log2(4.0 * source.size) * 2 * amplitude
+    value, sums = np.zeros(blurs.size), np.zeros(blurs.size)
+    for k, blur in enumerate(blurs):
+        y, x = (axis.gains[blur] for axis in axes)
+        off_y, off_x = (gain * (np.pi * np.arange(gain.size) + 25) for gain in (y, x))
+        along = y @ size
+        total = float(along @ x)
+        entries = float(off_y @ (size @ x)) + float(along @ off_x)
+        sums[k] = UNIT * (n_all + 8) * total
+        of_source = float(np.sqrt((y @ y) * (x @ x))) * transform
+        value[k] = sums[k] + UNIT * (entries + of_source)
+    return value, sums

@@ -20,6 +20,7 @@ from numba import njit
 from keystab.errors import InputError
 from keystab.scalespace.axis import AxisOperator, Block
 from keystab.scalespace.interpolants import Interpolant, interpolant
+from keystab.scalespace.rounding import Rounding
 from keystab.scalespace.sampling import Sampling, balanced_delta
 from keystab.utils import memory
 from keystab.utils.masks import unmasked
@@ -144,7 +145,10 @@ class ScaleSpace:
         return box
 
     def blocks(
-        self, along: list[Block], columns: tuple[int, int], slices: tuple[int, int]
+        self,
+        along: list[Block],
+        columns: tuple[int, int],
+        slices: tuple[int, int],
     ) -> Iterator[np.ndarray]:
         """One column of blocks, from top to bottom.
 
@@ -192,7 +196,7 @@ class ScaleSpace:
                 blurred,
             )
             subtract(blurred, lower, upper, block.rank, dog)
-            yield _expanded(dog[:, : block.rank], block.expand, across.expand)
+            yield dog[:, : block.rank]
 
     def scale_slice(self, index: int) -> np.ndarray:
         """One slice, shape (rows, columns)."""
@@ -238,14 +242,21 @@ class ScaleSpace:
         return max(float(self.image.max()), -float(self.image.min()))
 
     @cached_property
-    def rounding(self) -> float:
-        """Largest difference of two values of this scale-space that rounding can explain.
+    def rounding_bounds(self) -> Rounding:
+        """How far rounding may take values from what exact arithmetic would give."""
+        _, lower, upper = self.blurs
+        return self.interpolant.rounding(self.image, self.source, self.axes, lower, upper)
 
-        Sums of products with weights that add up to one are exact to some units in the last place
-        of the largest source value. Differences of samples below this carry no information: in
-        flat areas they would be extrema of nothing.
+    @property
+    def rounding(self) -> float:
+        """Smallest difference of two values that carries information.
+
+        Where exact values are equal, as in flat areas or along straight edges, computed ones may
+        differ by up to this, and would be extrema of nothing. The bound is proven from the sums
+        that are formed (`keystab.scalespace.rounding`); what is seen is 30 to 2000 times smaller
+        with splines, to 3000 with cosine series, whose terms cancel.
         """
-        return 2.0**-46 * self.interpolant.amplitude(self.image, self.source)
+        return self.rounding_bounds.counts
 
     def attributes(self) -> dict[str, object]:
         """Everything needed to build this scale-space again from its image."""
@@ -416,10 +427,3 @@ def subtract(blurred, lower, upper, height, dog):
             high, low, out = blurred[upper[s], y], blurred[lower[s], y], dog[s, y]
             for x in range(out.size):
                 out[x] = high[x] - low[x]
-
-
-def _expanded(dog: np.ndarray, along: np.ndarray | None, across: np.ndarray | None) -> np.ndarray:
-    """Apply what the operators of all blurs have in common."""
-    if across is not None:
-        dog = dog @ across.T
-    return dog if along is None else np.matmul(along, dog)

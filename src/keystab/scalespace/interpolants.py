@@ -12,9 +12,10 @@ import numpy as np
 
 from keystab.errors import InputError
 from keystab.scalespace.axis import AxisOperator
-from keystab.scalespace.cosine_axis import CosineAxis, cosine_source
+from keystab.scalespace.cosine_axis import CosineAxis, cosine_source, rounding_of_gaussians
 from keystab.scalespace.neighbourhoods import cosine_neighbourhoods, spline_neighbourhoods
-from keystab.scalespace.spline_axis import SplineAxis, spline_source
+from keystab.scalespace.rounding import UNIT, Rounding, largest_of_slices, of_local_rows
+from keystab.scalespace.spline_axis import SOURCE_ROUNDING, SplineAxis, spline_source
 
 __all__ = ["INTERPOLANTS", "CosineInterpolant", "Interpolant", "SplineInterpolant", "interpolant"]
 
@@ -42,8 +43,15 @@ class Interpolant(Protocol):
     ) -> np.ndarray:
         """Cubes of 3 x 3 x 3 samples around samples, shape (n, 3, 3, 3)."""
 
-    def amplitude(self, image: np.ndarray, source: np.ndarray) -> float:
-        """Largest value whose products are summed, in whose last places sums are uncertain."""
+    def rounding(
+        self,
+        image: np.ndarray,
+        source: np.ndarray,
+        axes: Axes,
+        lower: np.ndarray,
+        upper: np.ndarray,
+    ) -> Rounding:
+        """How far rounding may take values, given the two Gaussians of every slice."""
 
     def rows_in_reach(self, sigma: float, height: int) -> float:
         """Rows of the source that count for one row of a slice blurred by sigma, in pixels."""
@@ -73,9 +81,20 @@ class SplineInterpolant:
         """Sums over the few coefficients in reach."""
         return spline_neighbourhoods(source, axes, lower, upper, *centres)
 
-    def amplitude(self, image: np.ndarray, source: np.ndarray) -> float:
-        """Largest absolute coefficient."""
-        return float(np.abs(source).max())
+    def rounding(
+        self,
+        image: np.ndarray,
+        source: np.ndarray,
+        axes: Axes,
+        lower: np.ndarray,
+        upper: np.ndarray,
+    ) -> Rounding:
+        """From the largest coefficient, the rows of both axes and their columns."""
+        y, x = axes
+        assert isinstance(y, SplineAxis) and isinstance(x, SplineAxis)
+        amplitude = float(np.abs(source).max())
+        off = of_local_rows(amplitude, SOURCE_ROUNDING * UNIT, y.rounding, x.rounding)
+        return largest_of_slices(*off, lower, upper)
 
     def rows_in_reach(self, sigma: float, height: int) -> float:
         """Rows within some standard deviations on either side."""
@@ -106,9 +125,21 @@ class CosineInterpolant:
         """Sums over all coefficients that the Gaussians leave."""
         return cosine_neighbourhoods(source, axes, lower, upper, *centres)
 
-    def amplitude(self, image: np.ndarray, source: np.ndarray) -> float:
-        """Largest distance from the mean, which the difference of two blurs does not hold."""
-        return float(np.abs(image - image.mean()).max())
+    def rounding(
+        self,
+        image: np.ndarray,
+        source: np.ndarray,
+        axes: Axes,
+        lower: np.ndarray,
+        upper: np.ndarray,
+    ) -> Rounding:
+        """From the sizes of all coefficients; the smallest blurs leave most of them."""
+        y, x = axes
+        assert isinstance(y, CosineAxis) and isinstance(x, CosineAxis)
+        amplitude = float(np.abs(image - image.mean()).max())
+        blurs = np.array([lower.min(), upper.min()])
+        off = rounding_of_gaussians(source, amplitude, (y, x), blurs)
+        return largest_of_slices(*off, np.array([0]), np.array([1]))
 
     def rows_in_reach(self, sigma: float, height: int) -> float:
         """All rows: a sharp band limit rings."""

@@ -83,6 +83,7 @@ def cosine_neighbourhoods(
 def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, cubes):  # noqa: PLR0913
     y_rows = np.empty((3, source.shape[0]))
     x_rows = np.empty((3, source.shape[1]))
+    lines = np.empty((3, source.shape[1]))
     for k in range(s.size):
         top, left = (row[k] - 1) * stride, (column[k] - 1) * stride
         for a in range(3):
@@ -94,6 +95,7 @@ def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, 
                     source[y_first : y_first + height, x_first : x_first + width],
                     y_rows[:, :height],
                     x_rows[:, :width],
+                    lines,
                     1.0 if pair == 0 else -1.0,
                     cubes[k, a],
                 )
@@ -126,20 +128,49 @@ def _cosine_cubes(source, y_basis, x_basis, y_gains, x_gains, lower, upper, s, c
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _add_products(source, y_rows, x_rows, sign, out):
-    """Add ``sign * y_rows @ source @ x_rows.T`` (3 x 3) to `out`, in a fixed order of sums."""
+def _add_products(source, y_rows, x_rows, lines, sign, out):
+    """Add ``sign * y_rows @ source @ x_rows.T`` (3 x 3) to `out`, in a fixed order of sums.
+
+    `lines` is work space, shape (3, n) with at least as many columns as the source.
+    """
     n_y, n_x = source.shape
-    lines = np.zeros((3, n_x))
-    for i in range(n_y):
-        before, here, after = y_rows[0, i], y_rows[1, i], y_rows[2, i]
+    above, here, below = lines[0, :n_x], lines[1, :n_x], lines[2, :n_x]
+    for j in range(n_x):
+        above[j] = here[j] = below[j] = 0.0
+    i = 0
+    while i + 4 <= n_y:  # four rows at a time are added one after the other
+        s, t, u, v = source[i], source[i + 1], source[i + 2], source[i + 3]
+        y = y_rows[:, i : i + 4]
+        a0, a1, a2, a3 = y[0, 0], y[0, 1], y[0, 2], y[0, 3]
+        b0, b1, b2, b3 = y[1, 0], y[1, 1], y[1, 2], y[1, 3]
+        c0, c1, c2, c3 = y[2, 0], y[2, 1], y[2, 2], y[2, 3]
         for j in range(n_x):
-            value = source[i, j]
-            lines[0, j] += before * value
-            lines[1, j] += here * value
-            lines[2, j] += after * value
-    for b in range(3):
-        for e in range(3):
-            total = 0.0
-            for j in range(n_x):
-                total += lines[b, j] * x_rows[e, j]
-            out[b, e] += sign * total
+            above[j] = above[j] + a0 * s[j] + a1 * t[j] + a2 * u[j] + a3 * v[j]
+            here[j] = here[j] + b0 * s[j] + b1 * t[j] + b2 * u[j] + b3 * v[j]
+            below[j] = below[j] + c0 * s[j] + c1 * t[j] + c2 * u[j] + c3 * v[j]
+        i += 4
+    while i < n_y:
+        s = source[i]
+        a0, b0, c0 = y_rows[0, i], y_rows[1, i], y_rows[2, i]
+        for j in range(n_x):
+            above[j] += a0 * s[j]
+            here[j] += b0 * s[j]
+            below[j] += c0 * s[j]
+        i += 1
+    left, middle, right = x_rows[0], x_rows[1], x_rows[2]
+    a0 = a1 = a2 = b0 = b1 = b2 = c0 = c1 = c2 = 0.0
+    for j in range(n_x):
+        x, y, z = left[j], middle[j], right[j]
+        a, b, c = above[j], here[j], below[j]
+        a0, a1, a2 = a0 + a * x, a1 + a * y, a2 + a * z
+        b0, b1, b2 = b0 + b * x, b1 + b * y, b2 + b * z
+        c0, c1, c2 = c0 + c * x, c1 + c * y, c2 + c * z
+    out[0, 0] += sign * a0
+    out[0, 1] += sign * a1
+    out[0, 2] += sign * a2
+    out[1, 0] += sign * b0
+    out[1, 1] += sign * b1
+    out[1, 2] += sign * b2
+    out[2, 0] += sign * c0
+    out[2, 1] += sign * c1
+    out[2, 2] += sign * c2

@@ -13,10 +13,9 @@ import numpy as np
 from numba import njit
 
 from keystab.scalespace.axis import Block
-
-# Kernel values below this do not reach the last digit of a blurred image in [0, 1]; rounding of the
-# transform that makes the kernel stays below it.
-_NEGLIGIBLE = 3e-17
+from keystab.scalespace.grid_kernels import cosine_domain_kernel, off_in_kernel, two_sided
+from keystab.scalespace.rounding import UNIT, RowRounding
+from keystab.scalespace.spline_sums import blurred_spline_rows
 
 # Where the band limit of the grid shows, rows of L ring: what they hold beyond the distance at
 # which less than this is left of their sum (which is 1) is cut off, and the sum restored; but only
@@ -24,9 +23,16 @@ _NEGLIGIBLE = 3e-17
 _NEGLIGIBLE_RINGING = 1e-13
 _WORTH_CUTTING = 4
 
-# From this blur on, in samples, the band limit of the grid lies below the last digit: the kernel is
-# a sampled Gaussian and ends where that does, at 8.6 standard deviations at the latest.
-_LOCAL_BLUR, _LOCAL_REACH = 2.9, 8.6
+# Kernels that reach further than this many standard deviations ring.
+_LOCAL_REACH = 8.6
+
+SOURCE_ROUNDING = 60.0
+"""How far coefficients are off, in units of rounding of the largest one.
+
+Differences to the mean are rounded once. Elimination of three bands in which the middle outweighs
+the others is off by 4 units of its matrix (norm 1, of its inverse 3) along either axis; the first
+one's error is multiplied by the inverse of the second: 9 + 12 + 36 units, and some.
+"""
 
 # Half-sample mirror of the spline coefficients on either side, so that the four columns of a row
 # are always neighbours.
@@ -65,7 +71,8 @@ class SplineAxis:
         reach = np.array([kernel.size - 1 for kernel in kernels])
         rings = reach > _LOCAL_REACH * blurs / delta_min + 1
         dense = SplineRows(n_samples, taps, reach, splines, *_no_tables(blurs.size))
-        self.rows = with_tables(dense, np.flatnonzero(rings), self.n_columns)
+        self.rows, lacking = with_tables(dense, np.flatnonzero(rings), self.n_columns)
+        self.rounding = rounding_of_rows(self.rows, lacking, delta_min, blurs, self.n_columns)
 
     def block(self, start: int, stop: int) -> Block:
         """See `keystab.scalespace.axis.AxisOperator.block`."""
@@ -75,7 +82,7 @@ class SplineAxis:
             first, width = fill_rows(self.rows, blur, start * self.stride, self.stride, buffer)
             firsts.append(first)
             factors.append(buffer[:, :width].copy())
-        return Block.of(None, firsts, factors)
+        return Block.of(firsts, factors)
 
 
 def spline_source(image: np.ndarray) -> np.ndarray:
@@ -133,47 +140,6 @@ def spline_rows(n_samples: int, n_pixels: int, delta_min: float) -> tuple[np.nda
     return knot - 1 + _PADDING, weight
 
 
-def cosine_domain_kernel(n_samples: int, blur: float) -> np.ndarray:
-    r"""One side of the kernel by which the cosine-domain Gaussian of a grid convolves.
-
-    Multiplying the cosine transform of m samples by :math:`e^{-b^2 (\pi k / m)^2 / 2}` is a
-    circular convolution of the mirrored signal, of period 2m. Its kernel is *not* the sampled
-    Gaussian: for blurs below about 2.7 samples the band limit of the grid shows, as a tail that
-    hardly decays. The tail is cut where it no longer counts in double precision.
-
-    Parameters
-    ----------
-    n_samples : int
-        Samples m of the grid.
-    blur : float
-        Standard deviation b in samples; 0 is the identity.
-
-    Returns
-    -------
-    ndarray, shape (reach + 1,)
-        Kernel values at distances 0 .. reach, reach <= m.
-
-    Examples
-    --------
-    >>> kernel = cosine_domain_kernel(400, 3.0)
-    >>> abs(kernel[0] - 1 / (3 * (2 * np.pi) ** 0.5)) < 1e-15
-    np.True_
-    """
-    if blur == 0:
-        return np.ones(1)
-    local = int(_LOCAL_REACH * blur) + 1
-    if blur >= _LOCAL_BLUR and local < n_samples:
-        # In closed form, without the rounding and the time of the transform.
-        distance = np.arange(local + 1) / blur
-        kernel = np.exp(-0.5 * distance**2) / (blur * np.sqrt(2 * np.pi))
-    else:
-        frequency = np.pi * np.arange(n_samples + 1) / n_samples
-        kernel = np.fft.irfft(np.exp(-0.5 * (blur * frequency) ** 2), 2 * n_samples)
-        kernel = kernel[: n_samples + 1]
-    reach = int(np.flatnonzero(np.abs(kernel) > _NEGLIGIBLE)[-1])
-    return np.ascontiguousarray(kernel[: reach + 1])
-
-
 class MirroredSplines(NamedTuple):
     """Cubic B-splines of the fine samples and of their mirror images on both sides.
 
@@ -201,18 +167,6 @@ def mirrored_splines(column: np.ndarray, weight: np.ndarray, margin: int) -> Mir
     return MirroredSplines(
         column, weight, stop[np.searchsorted(changes, np.arange(column.size), side="right")]
     )
-
-
-def two_sided(kernels: list[np.ndarray], n_samples: int) -> np.ndarray:
-    """Both sides of all kernels in one array, the distance 0 in its middle column."""
-    reach = max(kernel.size for kernel in kernels) - 1
-    taps = np.zeros((len(kernels), 2 * reach + 1))
-    for row, kernel in zip(taps, kernels, strict=True):
-        row[reach : reach + kernel.size] = kernel
-        row[reach - kernel.size + 1 : reach + 1] = kernel[::-1]
-        if kernel.size > n_samples:
-            row[reach - n_samples] = 0.0  # the period 2m holds the distance m once, not twice
-    return taps
 
 
 @njit(cache=True, nogil=True)
@@ -260,7 +214,9 @@ def _no_tables(n_blurs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return (np.full(n_blurs, -1), *empty)
 
 
-def with_tables(rows: SplineRows, ringing: np.ndarray, n_columns: int) -> SplineRows:
+def with_tables(
+    rows: SplineRows, ringing: np.ndarray, n_columns: int
+) -> tuple[SplineRows, np.ndarray]:
     """Tabulate the rows of blurs whose kernel rings, as far as the rows themselves ring.
 
     The kernel's tail alternates from sample to sample, and splines hardly hold that frequency: of
@@ -268,11 +224,18 @@ def with_tables(rows: SplineRows, ringing: np.ndarray, n_columns: int) -> Spline
     that counts, they are computed once; where the whole row counts, it is made when needed. What is
     cut off changes samples by some 1e-13 of the image's range, and by up to some 1e-11 where the
     border is nearer than the cut.
+
+    Returns
+    -------
+    rows : SplineRows
+    lacking : ndarray, shape (n_blurs,)
+        Largest sum of what is cut off a row, and of what restoring its sum adds.
     """
+    lacking = np.zeros(rows.reach.size)
     reaches = {int(blur): _ringing_reach(rows, int(blur), n_columns) for blur in ringing}
     kept = [blur for blur, r in reaches.items() if _WORTH_CUTTING * (2 * r + 4) < n_columns]
     if not kept:
-        return rows
+        return rows, lacking
     width = 2 * max(reaches[blur] for blur in kept) + 4
     margin = (rows.splines.column.size - rows.n_samples) // 2
     column = rows.splines.column[margin : margin + rows.n_samples]
@@ -284,9 +247,47 @@ def with_tables(rows: SplineRows, ringing: np.ndarray, n_columns: int) -> Spline
             full = _full_rows(rows, blur, part.start, part.stop, n_columns)
             cut = np.take_along_axis(full, first[part, None] + np.arange(width), axis=1)
             value[number, part] = cut / cut.sum(axis=1, keepdims=True)
+            off = np.abs(full).sum(axis=1) - np.abs(cut).sum(axis=1)
+            off += np.abs(value[number, part] - cut).sum(axis=1)
+            lacking[blur] = max(lacking[blur], float(off.max()))
     table = rows.table.copy()
     table[kept] = np.arange(len(kept))
-    return rows._replace(table=table, first=np.tile(first, (len(kept), 1)), value=value)
+    rows = rows._replace(table=table, first=np.tile(first, (len(kept), 1)), value=value)
+    return rows, lacking
+
+
+def rounding_of_rows(
+    rows: SplineRows, lacking: np.ndarray, delta_min: float, blurs: np.ndarray, n_columns: int
+) -> RowRounding:
+    """Bound how far the rows of L are off, but for how positions of samples are rounded.
+
+    Parameters
+    ----------
+    rows : SplineRows
+    lacking : ndarray, shape (n_blurs,)
+        What rows lack on purpose, see `with_tables`.
+    delta_min : float
+        Distance of samples in pixels.
+    blurs : ndarray, shape (n_blurs,)
+        Gaussian standard deviations in pixels.
+    n_columns : int
+        Columns of the source.
+    """
+    norm = np.abs(rows.taps).sum(axis=1)
+    columns = np.minimum(2 * rows.reach * delta_min + 6, n_columns)
+    # An entry is a sum over the samples between two knots, and over up to eight such, four of them
+    # mirrored; the weights of a sample are off by 6 units in all.
+    off = (np.ceil(1 / delta_min) + 15) * UNIT * norm
+    for blur, sigma in enumerate(blurs / delta_min):
+        number, reach = rows.table[blur], int(rows.reach[blur])
+        if number < 0:
+            off[blur] += off_in_kernel(rows.n_samples, sigma, reach, 2 * reach + 1)
+            continue
+        value = rows.value[number]
+        n_taps = int(value.shape[1] / delta_min) + 1
+        off[blur] += lacking[blur] + off_in_kernel(rows.n_samples, sigma, reach, n_taps)
+        norm[blur], columns[blur] = np.abs(value).sum(axis=1).max(), value.shape[1]
+    return RowRounding(norm, columns, off)
 
 
 def _ringing_reach(rows: SplineRows, blur: int, n_columns: int) -> int:
@@ -349,53 +350,3 @@ def columns_of(rows, blur, start, last):
     reach = rows.reach[blur]
     first, end = column_range(start - reach, last + reach, rows.n_samples, rows.splines)
     return first, end - first
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def blurred_spline_rows(start, stride, taps, reach, splines, first, out):
-    """Fill `out` (zeroed) with rows ``start, start + stride, ...`` of the blurred spline.
-
-    The four weights of consecutive fine samples meet the same four columns until the next knot
-    is passed, so that sums stay in registers until then; and four rows meet the same weights, so
-    that the processor need not wait for one sum before it adds to the next.
-    """
-    column, weight, stops = splines
-    middle = taps.size // 2  # also the number of samples mirrored on each side
-    # Zeros around the taps: of four rows, the outer ones do not reach all samples.
-    margin = 3 * stride
-    tap = np.zeros(2 * (reach + margin) + 1)
-    tap[margin : margin + 2 * reach + 1] = taps[middle - reach : middle + reach + 1]
-    for row in range(0, out.shape[0], 4):
-        n_rows = min(4, out.shape[0] - row)
-        sample = start + row * stride - reach + middle
-        last = sample + 2 * reach + (n_rows - 1) * stride
-        shift = margin - sample
-        while sample <= last:
-            stop = min(stops[sample], last + 1)
-            a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = 0.0
-            c0 = c1 = c2 = c3 = d0 = d1 = d2 = d3 = 0.0
-            for i in range(sample, stop):
-                w0, w1, w2, w3 = weight[i, 0], weight[i, 1], weight[i, 2], weight[i, 3]
-                at = i + shift
-                a, b, c, d = tap[at], tap[at - stride], tap[at - 2 * stride], tap[at - 3 * stride]
-                a0, a1, a2, a3 = a0 + a * w0, a1 + a * w1, a2 + a * w2, a3 + a * w3
-                b0, b1, b2, b3 = b0 + b * w0, b1 + b * w1, b2 + b * w2, b3 + b * w3
-                c0, c1, c2, c3 = c0 + c * w0, c1 + c * w1, c2 + c * w2, c3 + c * w3
-                d0, d1, d2, d3 = d0 + d * w0, d1 + d * w1, d2 + d * w2, d3 + d * w3
-            here = column[sample] - first
-            _add_four(out[row], here, a0, a1, a2, a3)
-            if n_rows > 1:
-                _add_four(out[row + 1], here, b0, b1, b2, b3)
-            if n_rows > 2:
-                _add_four(out[row + 2], here, c0, c1, c2, c3)
-            if n_rows > 3:
-                _add_four(out[row + 3], here, d0, d1, d2, d3)
-            sample = stop
-
-
-@njit(cache=True, nogil=True)
-def _add_four(row, here, a, b, c, d):
-    row[here] += a
-    row[here + 1] += b
-    row[here + 2] += c
-    row[here + 3] += d

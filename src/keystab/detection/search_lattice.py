@@ -1,0 +1,231 @@
+r"""Search of a scale-space that looks only where an extremum can be.
+
+A sample is an extremum only if the differences to its neighbours along y, along x and along scale
+all change their sign there. Every p-th sample along y and x is a *node*. Between four nodes stands
+a *cell* of :math:`(p + 1)^2` samples, with a polynomial through the nodes whose coefficients prove,
+for nearly all cells, that along one axis all differences have one sign
+(`keystab.detection.search_hulls`), however far the polynomial may be from the samples
+(`keystab.detection.search_bounds`). What is left is expanded and compared
+(`keystab.detection.search_expansion`), and what then may be an extremum is decided by the caller
+from its own neighbourhood.
+
+**No sample is lost between cells.** Samples on a line between two cells belong to both. Where a
+cell is excluded along y, its samples rise, or fall, from each to the next, and so does its
+polynomial at each node: the slope there is larger than the bound, or less than minus it. Two cells
+above each other that are both excluded along y share the slope at their common nodes, so that both
+rise or both fall, and no sample on the line between them is an extremum. A cell that is excluded
+along x or along scale is so with the samples on its border. Of the four cells around a node, if
+none is excluded along scale, either one above and one below are excluded along y, and rise or fall
+together by the slope at the node, or the two on one side are excluded along x, and rise or fall
+together by theirs.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keystab.detection.search_bounds import SplineBounds, off_at_nodes
+from keystab.detection.search_cells import search_cells
+from keystab.detection.search_functionals import expansion
+from keystab.detection.search_hulls import CELLS, MARGIN, NODES
+from keystab.detection.search_nodes import LocalAxis, kinked_rows, local_axis, spline_nodes
+from keystab.detection.search_records import BLOCK, GROUP, TILE, Band, Kinked, NodeRows
+from keystab.detection.search_samples import search_samples
+from keystab.detection.search_sums import rows_of_nodes
+from keystab.scalespace.dog import ScaleSpace
+from keystab.scalespace.spline_axis import SplineAxis
+
+# Samples from one node to the next, where they lie one standard deviation of the finest slice
+# apart, and the power with which they become fewer: measured. Extrema among coarser samples differ
+# more from their neighbours and bear larger bounds, so that nodes may lie further apart.
+_SAMPLES, _POWER = 0.546, -0.83
+
+# Fewer samples than this are all made: what bounds the others takes some milliseconds.
+_FEW = 4e6
+
+# Lower Gaussians with a smaller blur, in distances of nodes, are not expanded at a second look.
+_KINKED = 1.4
+
+# Cells along x that are searched at once: bounds the memory on wide images.
+_COLUMNS = 1536
+
+# Images with larger values are left to a dense evaluation, which does not use single precision.
+LARGEST = 1e30
+
+
+def applies(space: ScaleSpace) -> bool:
+    """Whether a scale-space of splines can be searched so."""
+    return space.largest <= LARGEST and space.shape[0] > 2
+
+
+def node_distance(space: ScaleSpace) -> int:
+    """Samples from one node to the next."""
+    p = round(_SAMPLES * (space.sampling.step / float(space.sigma.min())) ** _POWER)
+    if np.prod(space.shape, dtype=float) < _FEW:
+        return 1
+    fit = min(space.shape[1:]) // (2 * MARGIN + 2)
+    return int(max(1, min(p, fit)))
+
+
+class LatticeSearch:
+    """Candidates for extrema of a spline scale-space, one part at a time.
+
+    Parameters
+    ----------
+    space : ScaleSpace
+        The octave.
+    tolerance : float
+        By how much an extremum differs from each of its 26 neighbours.
+    window : (slice, slice)
+        Rows and columns of samples that are asked for; others may be among the candidates.
+    threads : int
+        Parts that are searched at once.
+    p : int, optional
+        Samples from one node to the next.
+    """
+
+    @staticmethod
+    def applies(space: ScaleSpace) -> bool:
+        """See `applies`."""
+        return applies(space)
+
+    @staticmethod
+    def shares_of_memory(n_blurs: int) -> tuple[float, float]:
+        """What its rows and its strips take of those for all samples."""
+        return 1 / 3, 1 / 3
+
+    def __init__(
+        self,
+        space: ScaleSpace,
+        tolerance: float,
+        window: tuple[slice, slice],
+        threads: int = 1,
+        p: int | None = None,
+    ) -> None:
+        self.space, self.tolerance = space, tolerance
+        p = self.p = p or node_distance(space)
+        # Samples on a line between cells belong to both; blocks and groups are kept together.
+        first, n_cells = [], []
+        for asked in window:
+            begin = max((asked.start - 1) // p, 0) // GROUP * GROUP
+            first.append(begin)
+            n_cells.append(
+                max((asked.stop - 1) // p + 1 - begin, 0) if asked.stop > asked.start else 0
+            )
+        self.first, self.n_cells = first, n_cells
+        if min(n_cells) == 0:
+            self.parts: list[tuple[int, int, int]] = []
+            return
+        n_chunks = max(-(-n_cells[1] // _COLUMNS), min(threads, 2))
+        wide = -(-n_cells[1] // (n_chunks * TILE)) * TILE
+        self.parts = [
+            (top, left, min(wide, n_cells[1] - left))
+            for top in range(0, n_cells[0], CELLS)
+            for left in range(0, n_cells[1], wide)
+        ]
+        blurs, lower, _ = space.blurs
+        _, n_rows, n_columns = space.shape
+        each = tuple(blurs.tolist())
+        whole_y, whole_x = space.axes
+        assert isinstance(whole_y, SplineAxis) and isinstance(whole_x, SplineAxis)
+        y_axis, x_axis = (
+            local_axis(axis, each, space.sampling.delta_min) for axis in (whole_y, whole_x)
+        )
+        self.y_axis = y_axis
+        self.across = _nodes(
+            x_axis, p, first[1] - MARGIN, -(-(n_cells[1] + 2 * MARGIN) // GROUP) + 1, np.float32
+        )
+        self.off = float(off_at_nodes(space, (y_axis, x_axis)).max())
+        if p > 1:
+            small = blurs[lower] < _KINKED * p * space.sampling.step
+            n_kinked = min(int(np.cumprod(small).sum()), lower.size - 2)
+            self.kinked = _kinked(
+                (y_axis, x_axis), tuple(lower[:n_kinked].tolist()), (n_rows, n_columns)
+            )
+            many = tuple(
+                begin + -(-n // CELLS) * CELLS for begin, n in zip(first, n_cells, strict=True)
+            )
+            self.bounds = SplineBounds(space, (y_axis, x_axis), p, (many[0], many[1]), n_kinked)
+
+    def candidates(
+        self, part: tuple[int, int, int]
+    ) -> tuple[NDArray[np.int64], list[tuple[slice, slice]]]:
+        """Samples of a part that may be extrema, and rows and columns to be evaluated.
+
+        Returns
+        -------
+        candidates : ndarray of int, shape (n, 4)
+            Slice, row, column; the fourth column is not used.
+        dense : list of (slice, slice)
+            Samples among which all are candidates.
+        """
+        space, p = self.space, self.p
+        blurs, lower, upper = space.blurs
+        top, left, n_cells = part
+        along = _nodes(self.y_axis, p, self.first[0] + top - MARGIN, NODES // GROUP, np.float64)
+        begin = left // GROUP
+        across = self.across.part(begin, begin + -(-(n_cells + 2 * MARGIN) // GROUP))
+        # Only what the nodes see of the source.
+        y0, y1 = along.first.min(), (along.first + along.width).max()
+        x0, x1 = across.first.min(), (across.first + across.width).max()
+        source = space.source[y0:y1, x0:x1]
+        # Differences of Gaussians do not see a level: without it, less is rounded.
+        level = float(source.min() + source.max()) / 2
+        amplitude = float(source.max() - level)
+        blurred = np.empty((blurs.size, source.shape[1], NODES), dtype=np.float32)
+        rows_of_nodes(along._replace(first=along.first - y0), source - level, blurred)
+        across = across._replace(first=across.first - x0)
+        n_tiles = -(-n_cells // TILE)
+        dense = np.zeros(n_tiles, dtype=np.bool_)
+        found = np.empty((1024 * n_tiles, 3), dtype=np.int64)
+        row, column = p * (self.first[0] + top), p * (self.first[1] + left)
+        band = Band(p, row, column, n_cells, *space.shape[1:])
+        if p == 1:
+            off = 2 * amplitude * self.off + 4 * space.rounding_bounds.value
+            count = search_samples(
+                across, blurred, lower, upper, band, off, self.tolerance, found, dense
+            )
+        else:
+            count = search_cells(
+                across,
+                blurred,
+                lower,
+                upper,
+                band,
+                expansion(p),
+                self.bounds.of(
+                    (self.first[0] + top) // BLOCK,
+                    (self.first[1] + left) // BLOCK,
+                    -(-n_cells // BLOCK),
+                    amplitude,
+                    self.tolerance,
+                ),
+                self.tolerance,
+                self.kinked._replace(source=space.source, level=level),
+                found,
+                dense,
+            )
+        candidates = np.zeros((count, 4), dtype=np.int64)
+        candidates[:, :3] = found[:count]
+        regions = [
+            (slice(row, row + p * CELLS + 1), slice(x, x + p * TILE + 1))
+            for x in (column + p * TILE * np.flatnonzero(dense)).tolist()
+        ]
+        return candidates, regions
+
+
+@lru_cache(maxsize=64)
+def _nodes(axis: LocalAxis, p: int, begin: int, n_groups: int, dtype: type) -> NodeRows:
+    """Rows at nodes, kept for further images of this size."""
+    return spline_nodes(axis, p, begin, n_groups, dtype)
+
+
+@lru_cache(maxsize=4)
+def _kinked(
+    axes: tuple[LocalAxis, LocalAxis], blurs: tuple[int, ...], n_samples: tuple[int, int]
+) -> Kinked:
+    """Rows of Gaussians of a small blur, kept for further images of this size."""
+    return kinked_rows(axes, np.empty((0, 0)), np.array(blurs, dtype=np.int64), n_samples)
