@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -136,13 +136,6 @@ class DogSeries:
         coefs = cosine_series.coefficients(image)
         coefs[0, 0] = 0.0  # no difference of Gaussians has a mean
         return cls(coefs, (coefs.shape[0], coefs.shape[1]), blur, kappa)
-
-    def truncated(self, sigma: float) -> DogSeries:
-        """Series without the frequencies that count for no scale of `sigma` or more."""
-        blur = math.sqrt(max(sigma**2 - self.blur**2, 0.0))
-        counts = [cosine_series.significant(n, blur) for n in self.shape]
-        coefs = np.ascontiguousarray(self.coefficients[: counts[0], : counts[1]])
-        return replace(self, coefficients=coefs)
 
     @cached_property
     def contrast(self) -> float:

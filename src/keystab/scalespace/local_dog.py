@@ -13,11 +13,11 @@ over samples differs from the convolution by aliases of the Gaussian's spectrum:
 
 .. math:: e^{-(\sigma_j^2 - c^2 - \tau^2) f^2 / 2} \, e^{-B (2\pi/h - f)^2 / 2}.
 
-With :math:`\tau^2 = \tfrac12 (\sigma_j^2 - c^2)` this is largest at :math:`f = \pi / h`, and at most
-:math:`e^{-\tau^2 \pi^2 / h^2}`, so that the distance h may grow with the scale: each of the `Level`
-objects serves from its own :math:`\sigma_j` on, up to the next one. Below the first of these the
-series is sampled three times a pixel: no frequency is above half a cycle per pixel, and the alias
-of one is smaller than itself by :math:`e^{-12 \pi^2 \tau^2}` at least.
+With :math:`\tau^2 = \tfrac12 (\sigma_j^2 - c^2)` this is largest at :math:`f = \pi / h`, and at
+most :math:`e^{-\tau^2 \pi^2 / h^2}`, so that the distance h may grow with the scale: each `Level`
+serves from its own :math:`\sigma_j` on, up to the next one. Below the first of these the series is
+sampled three times a pixel: no frequency is above half a cycle per pixel, and the alias of one is
+smaller than itself by :math:`e^{-12 \pi^2 \tau^2}` at least.
 """
 
 from __future__ import annotations
@@ -166,8 +166,8 @@ class LocalDog:
             n = sigma.size
             jets = Jets(np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3)))
             at = np.stack([sigma, y, x])
-            jets.put(below, self.sharpened.jets(*at[:, below], within_slices))
-            jets.put(~below, self.jets(*at[:, ~below], within_slices))
+            for series, part in ((self.sharpened, below), (self, ~below)):
+                jets.put(part, series.jets(at[0, part], at[1, part], at[2, part], within_slices))
             return jets
         n = sigma.size
         moments = np.zeros((2, n, len(_PAIRS)))

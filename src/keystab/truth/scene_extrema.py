@@ -156,7 +156,7 @@ def _seeds(
     seeds = _mapped(joined([seeds_of(space, threads) for space in spaces]), finer, scene.shape, rim)
     if low == sigma_min / SEEDS_BEYOND:
         return seeds
-    first = seeds_of_first_slice(spaces[int(np.argmax(samplings))])
+    first = seeds_of_first_slice(spaces[int(np.argmax(samplings))], threads)
     return joined([seeds, growing(series, _mapped(first, finer, scene.shape, rim))])
 
 

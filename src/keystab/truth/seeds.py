@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+import threadpoolctl
 from numpy.typing import NDArray
 
 from keystab.detection.extrema import discrete_extrema, extrema_of_array
@@ -16,6 +18,7 @@ from keystab.scalespace.dog import ScaleSpace, ranges, scale_space
 from keystab.utils import validation
 
 __all__ = [
+    "NO_SEEDS",
     "Seeds",
     "along_curve",
     "coarser",
@@ -23,6 +26,7 @@ __all__ = [
     "joined",
     "listed",
     "octave_of",
+    "range_of_seeds",
     "seeds_of",
     "seeds_of_first_slice",
 ]
@@ -31,8 +35,12 @@ SEED_SAMPLINGS = (5, 10, 15)
 """Scales per octave of the samplings whose discrete extrema are the seeds."""
 
 #: Seeds are sought beyond the range of scales by this factor, so that what lies at its ends is
-#: found. No image is sampled below its own blur.
+#: found.
 SEEDS_BEYOND = 2**0.25
+
+#: And below the image's own blur by these factors at most: undoing blur amplifies frequencies, by e
+#: to half the second number at the highest of them.
+_BELOW_BLUR, _MOST_AMPLIFIED = 0.92, 5.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +59,9 @@ class Seeds:
     y: NDArray[np.float64]
     x: NDArray[np.float64]
     sign: NDArray[np.float64]
+
+
+NO_SEEDS = Seeds(*np.zeros((4, 0)))
 
 
 def octave_of(
@@ -75,23 +86,35 @@ def octave_of(
     )
 
 
+def range_of_seeds(blur: float, sigma_min: float, sigma_max: float) -> tuple[float, float]:
+    """Scales between which seeds are sought, in pixels of an image that has some blur."""
+    sharpest = math.sqrt(max(blur**2 - _MOST_AMPLIFIED / math.pi**2, 0.0))
+    return max(sigma_min / SEEDS_BEYOND, _BELOW_BLUR * blur, sharpest), sigma_max * SEEDS_BEYOND
+
+
 def seeds_of(space: ScaleSpace, threads: int = 1) -> Seeds:
     """Discrete extrema of a sampled scale-space."""
     s, row, column, sign = discrete_extrema(space, threads=threads).T
     return Seeds(space.sigma[s], space.y[row], space.x[column], sign.astype(np.float64))
 
 
-def seeds_of_first_slice(space: ScaleSpace) -> Seeds:
+def seeds_of_first_slice(space: ScaleSpace, threads: int = 1) -> Seeds:
     """Seeds for the extrema between the first slice and the second.
 
     Below the first slice there may be none, where it is the image itself. A sample of it may be a
     seed when it is extremal among its neighbours in these two slices; `growing` says whether it
     is worth while.
     """
-    parts = []
-    for top, bottom in ranges(1, space.shape[1] - 1, 256):
+
+    def extremal(rows: tuple[int, int]) -> NDArray[np.int64]:
+        top, bottom = rows
         two = space.window(slice(0, 2), slice(top - 1, bottom + 1))
-        parts.append(extrema_of_array(two[[1, 0, 1]], space.rounding, (top - 1, 0)))
+        return extrema_of_array(two[[1, 0, 1]], space.rounding, (top - 1, 0))
+
+    space.source, space.axes  # noqa: B018  made once, before threads share them
+    bands = list(ranges(1, space.shape[1] - 1, 256))
+    with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
+        parts = list(pool.map(extremal, bands))
     _, row, column, sign = np.concatenate([np.empty((0, 4), dtype=np.int64), *parts]).T
     sigma = np.full(sign.size, space.sigma[0])
     return Seeds(sigma, space.y[row], space.x[column], sign.astype(np.float64))
@@ -139,10 +162,25 @@ def along_curve(jets: Jets) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return slope, curvature
 
 
-def coarser(seeds: Seeds, factor: float) -> Seeds:
-    """Seeds of a picture that is sampled more finely, in pixels of the picture itself."""
-    y, x = ((p + 0.5) / factor - 0.5 for p in (seeds.y, seeds.x))
-    return Seeds(seeds.sigma / factor, y, x, seeds.sign)
+def coarser(seeds: Seeds, factor: int, rim: int, shape: tuple[int, int]) -> Seeds:
+    """Seeds of a picture that is sampled more finely, in pixels of the picture itself.
+
+    Parameters
+    ----------
+    seeds : Seeds
+        In pixels of the finer picture.
+    factor : int
+        How much finer.
+    rim : int
+        Pixels of the picture itself that the finer one has around it.
+    shape : (int, int)
+        Height and width of the picture itself; seeds beyond its mirrors are left out.
+    """
+    y, x = ((p + 0.5) / factor - 0.5 - rim for p in (seeds.y, seeds.x))
+    inside = (np.abs(y - (shape[0] - 1) / 2) <= shape[0] / 2) & (
+        np.abs(x - (shape[1] - 1) / 2) <= shape[1] / 2
+    )
+    return Seeds(seeds.sigma[inside] / factor, y[inside], x[inside], seeds.sign[inside])
 
 
 def joined(seeds: list[Seeds]) -> Seeds:

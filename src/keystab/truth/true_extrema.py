@@ -22,18 +22,19 @@ import pandas as pd
 from keystab.errors import InputError
 from keystab.scalespace.continuous_dog import ContinuousDog, DogSeries
 from keystab.scalespace.cosine_series import sampled
-from keystab.scalespace.dog import checked_image
+from keystab.scalespace.dog import ScaleSpace, checked_image
 from keystab.scalespace.local_dog import LocalDog
 from keystab.truth.newton import climb, newton_step, range_of_climbs
 from keystab.truth.seeds import (
+    NO_SEEDS,
     SEED_SAMPLINGS,
-    SEEDS_BEYOND,
     Seeds,
     coarser,
     growing,
     joined,
     listed,
     octave_of,
+    range_of_seeds,
     seeds_of,
     seeds_of_first_slice,
 )
@@ -46,6 +47,9 @@ SAME = 1e-6
 
 #: The image's series is sampled so many times as finely where seeds are sought.
 _FINER = 2
+
+#: Width of the picture's mirror image around it there, in units of the largest blur.
+_RIM = 4.0
 
 #: Gradient, relative to the contrast of the image, at which an extremum counts as found.
 RESIDUAL = 1e-12
@@ -73,7 +77,7 @@ def true_extrema(
               \cos(g_l (x + \tfrac12)) \left( e^{-(\kappa^2\sigma^2 - c^2)(f_k^2 + g_l^2)/2}
               - e^{-(\sigma^2 - c^2)(f_k^2 + g_l^2)/2} \right)
 
-    an analytic function. Its extrema in scale and position are found by Newton's method on the
+    an analytic function. Its extrema in scale and position are found by Newton's method on
     local sums (`keystab.scalespace.local_dog`), from the discrete extrema of several samplings.
 
     Parameters
@@ -140,7 +144,8 @@ def true_extrema(
     dense find the same 883 extrema, and a second search that follows the extrema of each scale
     through the scales, in the tests, finds nothing else.
 
-    TIME
+    Sums are local: a point costs the same in any picture, and time grows with its area, 50 s of a
+    core per megapixel for sigma from 1.1 to 2.2 where there are 13,000 extrema in one.
 
     The noise and the aliasing of an image are part of it; `keystab.scene_extrema` gives the
     extrema that a view of a known scene should have.
@@ -161,23 +166,45 @@ def true_extrema(
     check_scales(camera_blur, sigma_min, sigma_max, kappa)
     samplings = listed(n_spo)
     coefs = DogSeries.of_image(array, float(camera_blur), float(kappa))
-    low = max(sigma_min / SEEDS_BEYOND, camera_blur)
-    high = sigma_max * SEEDS_BEYOND
-    height, width = coefs.shape
-    # Sampled twice as finely, the series is as good as its spline, whose search is a local one.
-    finer = sampled(coefs.coefficients, (_FINER * height, _FINER * width))
-    spaces = [
-        octave_of(finer, _FINER * camera_blur, n, _FINER * low, _FINER * high, kappa, "spline")
-        for n in samplings
-    ]
-    seeds = joined([seeds_of(space, threads) for space in spaces])
-    first = seeds_of_first_slice(spaces[int(np.argmax(samplings))])
-    del spaces, finer
+    seeds, first = _seeds(coefs, sigma_min, sigma_max, samplings, threads)
     series = LocalDog.of_series(coefs, *range_of_climbs(coefs.blur, sigma_min, sigma_max))
-    seeds = joined([coarser(seeds, _FINER), growing(series, coarser(first, _FINER))])
+    seeds = joined([seeds, growing(series, first)])
     found = extrema_from(series, seeds, sigma_min, sigma_max, threads)
+    height, width = coefs.shape
     inside = found["y"].between(0, height - 1) & found["x"].between(0, width - 1)
     return found[inside].reset_index(drop=True)
+
+
+def _seeds(
+    coefs: DogSeries, sigma_min: float, sigma_max: float, samplings: list[int], threads: int
+) -> tuple[Seeds, Seeds]:
+    """Discrete extrema; and samples of the image itself that may be so with all that is finer."""
+    low, high = range_of_seeds(coefs.blur, sigma_min, sigma_max)
+    blur = min(coefs.blur, low)
+    # Sampled twice as finely, the series is as good as its spline, whose search is a local one; and
+    # where seeds are sought below the image's own blur, with that blur undone.
+    gains = [
+        np.exp((coefs.blur**2 - blur**2) / 2 * (np.pi / n * np.arange(n)) ** 2) for n in coefs.shape
+    ]
+    height, width = coefs.shape
+    finer = sampled(coefs.coefficients, (_FINER * height, _FINER * width), gains)
+    # The grid of a scale-space is mirrored at its first and last samples; the picture, half a pixel
+    # beyond. A rim of its mirror image keeps the one away from the other.
+    rim = math.ceil(_RIM * coefs.kappa * high)
+    finer = np.pad(finer, _FINER * rim, mode="symmetric")
+
+    def space(n: int, first: float) -> ScaleSpace:
+        ends = (_FINER * first, _FINER * high)
+        return octave_of(finer, _FINER * blur, n, *ends, coefs.kappa, "spline")
+
+    seeds = joined([seeds_of(space(n, low), threads) for n in samplings])
+    first = NO_SEEDS
+    if coefs.blur > low:  # just above it, no slice or few are finer
+        first = seeds_of_first_slice(space(max(samplings), coefs.blur), threads)
+    return (
+        coarser(seeds, _FINER, rim, coefs.shape),
+        coarser(first, _FINER, rim, coefs.shape),
+    )
 
 
 def extrema_from(
