@@ -47,6 +47,12 @@ def command(function: Callable[..., None]) -> Callable[..., int]:
         Takes the words of a command line, those of the process by default, and returns 0, or 2
         after one line on standard error about its input, its disk or its memory. Any other failure
         is a defect of this program: its traceback is shown, last line last.
+
+    Raises
+    ------
+    SystemExit
+        With what that returns, where the module is run and not imported: a stage is the last thing
+        in its module and needs no lines there that call it.
     """
 
     @functools.wraps(function)
@@ -72,6 +78,8 @@ def command(function: Callable[..., None]) -> Callable[..., int]:
             return 2
         return 0
 
+    if function.__module__ == "__main__":
+        raise SystemExit(run())
     return run
 
 

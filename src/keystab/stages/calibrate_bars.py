@@ -54,7 +54,3 @@ def main(
     write_table(reliability_table(second, by), reliability)
     write_table(separation_table(second, by), separation)
     print(held[(held["method"] == "bars") & (held["level"] == 0.9)].to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -15,7 +15,3 @@ def main(optics: Optics, *, table: Path, profiles: Path) -> None:
     lens = (optics.wavelength, optics.fill_factor, optics.defocus, optics.spherical)
     write_table(optics_table(optics.f_numbers, optics.pixel_pitches, *lens), table)
     write_table(profile_table(optics.profile_f_number, optics.profile_pitch, *lens), profiles)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

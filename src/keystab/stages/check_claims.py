@@ -22,7 +22,3 @@ def main(claims: Path, tables: list[Path], *, csv: Path, json: Path, markdown: P
     write_report(found, csv, json, markdown)
     for verdict, number in tally(found).items():
         print(f"{number:3d} {verdict}")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

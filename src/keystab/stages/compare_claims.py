@@ -20,7 +20,3 @@ def main(verdicts: list[Path], names: list[str], *, csv: Path, markdown: Path) -
         part.write_text(to_markdown(table), encoding="utf-8", newline="")
     depends = table.loc[table["depends"] == "yes", "id"]
     print(f"verdicts that depend on the picture: {len(depends)}", *depends)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -49,7 +49,3 @@ def main(
             }
         )
     write_table(pd.DataFrame(rows), table)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -23,7 +23,3 @@ def main(views: list[Store], name: str, values: list[float], size: int, *, table
         columns = {"y": (y + top).ravel(), "x": (x + left).ravel(), "grey": crop.ravel()}
         parts.append(pd.DataFrame({name: value, **columns}))
     write_table(pd.concat(parts, ignore_index=True), table)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

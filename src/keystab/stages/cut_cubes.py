@@ -35,7 +35,3 @@ def main(
     panel_table, cube_table = cubes_around(space, chosen, **vars(tolerance))
     write_table(panel_table, panels)
     write_table(cube_table, cubes)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -34,7 +34,3 @@ def main(views: Store, *, table: Path, pixels: Path) -> None:
         parts.append(pd.DataFrame(columns))
     write_table(pd.DataFrame(rows), table)
     write_table(pd.concat(parts, ignore_index=True), pixels)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -41,7 +41,3 @@ def main(
     write_table(table, extrema)
     write_table(models, traces)
     print(f"{len(table)} extrema among {space.sampling.n_samples:,} samples")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -18,7 +18,3 @@ def main(blobs: Blobs, *, extrema: Path, traces: Path) -> None:
     write_table(found, extrema)
     write_table(models, traces)
     print(f"{len(found)} extrema")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -30,7 +30,3 @@ def main(
         tables.append(table)
         print(f"{len(table)} extrema at delta_min = {step}")
     write_table(pd.concat(tables, ignore_index=True), extrema)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

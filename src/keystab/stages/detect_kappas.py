@@ -36,7 +36,3 @@ def main(
     write_table(table, extrema)
     write_table(models, traces)
     print(f"{len(table)} extrema for {len(kappas)} ratios")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -44,7 +44,3 @@ def main(
     whole = pd.concat(parts, ignore_index=True)
     write_table(whole, extrema)
     print(f"{len(whole)} extrema in {len(n_spo)} samplings")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

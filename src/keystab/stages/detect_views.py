@@ -39,7 +39,3 @@ def main(
     write_table(table, extrema)
     write_table(models, traces)
     print(f"{len(table)} extrema in {len(seen)} views")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

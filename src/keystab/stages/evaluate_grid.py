@@ -34,7 +34,3 @@ def main(
         for (n_spo, delta_min), found in read_table(path).groupby(["n_spo", "delta_min"])
     ]
     write_table(pd.DataFrame(rows), table)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -42,7 +42,3 @@ def main(
     result = pd.DataFrame(rows)
     write_table(result, table)
     print(result[["kappa", "detections", "n_true", "recall", "precision"]].to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

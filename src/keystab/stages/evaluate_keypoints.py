@@ -35,7 +35,3 @@ def main(
     write_table(table, causes)
     write_table(areas_of_labels(read_table(features), group, cause, n_resamples), auc)
     print(table.to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -43,7 +43,3 @@ def main(
         for n, path in zip(n_spo, samplings, strict=True)
     ]
     write_table(pd.concat(parts, ignore_index=True), table)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -45,7 +45,3 @@ def main(
     result = pd.DataFrame(rows)
     write_table(result, table)
     print(result[["n_spo", "detections", "recall", "precision"]].to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -27,7 +27,3 @@ def main(
     extrema = scene_extrema(picture, spec, *ends, kappa, reference_blur)
     write_table(extrema, table)
     print(f"{len(extrema)} true extrema of the scene")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

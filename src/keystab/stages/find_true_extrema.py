@@ -17,7 +17,3 @@ def main(views: Store, scales: Scales, sigma_max: float, *, table: Path) -> None
     extrema = true_extrema(view.image, view.blur, scales.sigma_min, sigma_max, scales.kappa)
     write_table(extrema, table)
     print(f"{len(extrema)} true extrema")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -14,7 +14,3 @@ def main(files: list[Path], *, checksums: Path) -> None:
     with written_whole(checksums) as part:
         part.write_text(list_of_files(files), encoding="utf-8", newline="")
     print(f"{len(files)} files")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

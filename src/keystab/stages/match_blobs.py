@@ -16,7 +16,3 @@ def main(blobs: Blobs, extrema: Path, traces: Path, accepted: Acceptance, *, tab
     ends = [how.pop(name) for name in ("size_from", "size_to", "size_count")]
     found = (read_table(extrema), read_table(traces))
     write_table(blob_table(sizes(*ends), **how, detections=found), table)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

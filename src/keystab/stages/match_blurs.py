@@ -33,7 +33,3 @@ def main(
     result = errors_by_octave(keypoints, everywhere, blurs, assumed_blur, kappa, vars(same))
     write_table(result, table)
     print(result.to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -50,7 +50,3 @@ def main(
         counts = sampling_counts(extrema, extrema[common(extrema, "step_sigma")], vars(same))
         rows.append({**here, "balanced": is_balanced, "n_samples": sampling.n_samples, **counts})
     write_table(pd.DataFrame(rows), table)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

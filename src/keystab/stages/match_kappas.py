@@ -35,7 +35,3 @@ def main(
     write_table(tables.keypoints, keypoints)
     write_table(tables.occurrence, occurrence)
     print(tables.counts.to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

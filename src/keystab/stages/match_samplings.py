@@ -45,7 +45,3 @@ def main(
     write_table(tables.summary(matched, reverse, **vars(stable)), summary)
     proven = "proven minimal" if matched.gap == 0 else f"at most {matched.gap} more than minimal"
     print(f"{len(matched.keypoints)} unique keypoints of {len(common)} detections, {proven}")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

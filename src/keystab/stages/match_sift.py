@@ -41,7 +41,3 @@ def main(
         count_tables.append(count_table(matched, {"shipped": name}))
     write_joined(curve_tables, curves)
     print(write_joined(count_tables, counts).to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

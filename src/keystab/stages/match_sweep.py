@@ -58,7 +58,3 @@ def main(
     if scales:
         write_joined(scale_tables, scales)
     print(write_joined(count_tables, counts).to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -53,7 +53,3 @@ def main(
     write_joined(rate_tables, rates)
     write_table(pd.DataFrame({"variant": names, "differs_in": differences}), variants)
     print(write_joined(summaries, summary).to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

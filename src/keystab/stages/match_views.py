@@ -61,7 +61,3 @@ def main(
     write_joined(curve_tables, curves)
     write_joined(precision_tables, precision)
     print(write_joined(count_tables, counts).to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -20,7 +20,3 @@ def main(camera_blur: float, scales: Scales, n_oct: int, *, table: Path) -> None
     write_table(
         pd.DataFrame({"sigma": sigma, "dog_noise": here, "octave_ratio": here / above}), table
     )
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

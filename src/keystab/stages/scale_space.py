@@ -16,7 +16,3 @@ def main(views: Store, n_spo: int, dog: DifferenceOfGaussians, *, store: Store) 
     write_scale_space(space, store.path)
     write_checksums(*store)
     print("x".join(map(str, space.shape)), "samples")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

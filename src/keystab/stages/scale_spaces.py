@@ -18,7 +18,3 @@ def main(views: Store, n_spo: int, dog: ScaleSpaceOfViews, *, store: Store) -> N
             write_scale_space(space, store_of(store.path, number, octave))
     write_checksums(*store)
     print(f"the scale-spaces of {len(seen)} views")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

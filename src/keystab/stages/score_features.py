@@ -34,7 +34,3 @@ def main(
     write_table(scores.roc, roc)
     write_table(scores.auc, auc)
     print(scores.auc.to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -60,7 +60,3 @@ def main(
     write_table(scored.gain, gain)
     write_table(scored.roc, roc)
     print(scored.gain.to_string(index=False))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -18,7 +18,3 @@ def main(semigroup: Semigroup, *, table: Path) -> None:
     # Rounded, so that 0.7 is 0.7 and not 0.7000000000000001.
     sigmas = np.linspace(it.sigma_from, it.sigma_to, it.sigma_count).round(12)
     write_table(semigroup_table(it.blob, it.n_passes, sigmas, truncation=it.truncation), table)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

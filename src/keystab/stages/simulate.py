@@ -43,7 +43,3 @@ def main(
     write_views(images, specs, views.path, attributes, dtype)
     write_checksums(*views)
     print(f"{len(specs)} view(s), the first of {specs[0].shape[0]} x {specs[0].shape[1]} px")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
