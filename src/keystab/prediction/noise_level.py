@@ -59,10 +59,10 @@ def estimated_noise(image: NDArray[np.float64]) -> float:
     here (``coldwarm``, ``street``, ``lake``, ``stream``, ``peaks``). On the other four noise of
     0.003 to 0.07 is found within 2 % for camera blurs of 0.65 to 1.1, and within 4 % at 0.001 but
     for one (-11 %). With a blur of 0.5 aliasing leaves much of a fine texture at the highest
-    frequencies: 0.01 to 0.07 is found within 3 %, and 0.003 within 2 % but for one (-32 %); of the
-    five, 0.003 within 5 %. With a blur of 0.3 it is off by up to 52 % at 0.01 and by 7 % at 0.07. In
-    views of blur 0.8 without noise at most 0.0003 is found. On larger pictures of the same kind the
-    random part, 1 to 2 % there, is smaller.
+    frequencies: 0.01 to 0.07 is found within 3 %, and 0.003 within 2 % but for one (-32 %); on the
+    five, 0.003 within 5 %. With a blur of 0.3 it is off by up to 52 % at 0.01 and by 7 % at 0.07.
+    In views of blur 0.8 without noise at most 0.0003 is found. The random part is 1 to 2 % there,
+    and less on larger pictures.
 
     JPEG of quality 90 leaves 8 to 27 % of a noise of 0.01, 28 to 63 % of 0.003, and adds 10 to 14 %
     to 0.03. Signal-dependent noise (a third of its variance constant at mid-grey) is found as 75 to
@@ -111,8 +111,8 @@ def _energies(image: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
         for left in range(0, _SIDE, step):
             part = image[top:, left:]
             rows, columns = (size // _SIDE for size in part.shape)
-            patches = part[: rows * _SIDE, : columns * _SIDE].reshape(rows, _SIDE, columns, _SIDE)
-            patches = patches.transpose(0, 2, 1, 3).reshape(-1, _SIDE, _SIDE)
+            split = part[: rows * _SIDE, : columns * _SIDE].reshape(rows, _SIDE, columns, _SIDE)
+            patches = split.transpose(0, 2, 1, 3).reshape(-1, _SIDE, _SIDE)
             clipped = ((patches == ends[0]) | (patches == ends[1])).sum(axis=(1, 2)) > _CLIPPED
             squares = (transform @ patches[~clipped] @ transform.T) ** 2
             parts.append((squares[:, finest].mean(axis=1), squares[:, fine].mean(axis=1)))

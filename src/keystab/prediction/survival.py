@@ -130,8 +130,7 @@ def among_scenes(
     Outcome
         Of a shift from the extremum of the one shot to that of the other.
     """
-    root = np.linalg.cholesky(_regular(scene_jets(kappa)))
-    whitening = np.linalg.inv(root)
+    root, whitening = _scene_axes(kappa)
     power, axes = np.linalg.eigh(whitening @ _regular(noise) @ whitening.T)
     power = np.maximum(power, 0.0)[:, None, :]  # of the noise, where the scene's is z
     seen = np.einsum("nij,ni->nj", axes, _at_extremum(jets) @ whitening.T)[:, None, :]
@@ -158,6 +157,13 @@ def _regular(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     more = _UNKNOWN * variance + np.finfo(float).tiny
     regular: NDArray[np.float64] = covariance + more[..., None] * np.eye(covariance.shape[-1])
     return regular
+
+
+@cache
+def _scene_axes(kappa: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Root of the covariance of scenes, and its inverse: the same for all pictures."""
+    root = np.asarray(np.linalg.cholesky(_regular(scene_jets(kappa))), np.float64)
+    return root, np.asarray(np.linalg.inv(root), np.float64)
 
 
 @cache
