@@ -48,6 +48,7 @@ def test_a_picture_in_other_units_or_on_a_ramp_has_as_much_noise():
     picture = texture() + 0.01 * noise_of(3)
     once = estimated_noise(picture)
     assert estimated_noise(256 * picture + 7) == pytest.approx(256 * once, rel=1e-9)
+    assert estimated_noise(1e300 * picture) == pytest.approx(1e300 * once, rel=1e-9)
     ramp = 0.01 * np.arange(SHAPE[1])
     assert estimated_noise(picture + ramp) == pytest.approx(once, rel=0.1)
     assert estimated_noise(picture.T) == pytest.approx(once, rel=1e-9)

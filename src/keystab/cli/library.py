@@ -108,6 +108,10 @@ def _tabulate(
 
     _check_outputs(args)
     image = read_picture(args.picture)
+    if args.draw is not None:
+        from keystab.figures.overlay import check_drawing, draw_keypoints
+
+        check_drawing(image.shape, args.part, args.enlarge)
     options = {name: getattr(args, name) for name in args.parameters}
     if options["camera_blur"] == "auto":
         options["camera_blur"] = _blur_of_edges(args, image)
@@ -126,8 +130,6 @@ def _tabulate(
     if args.draw is not None or args.output is not None or sys.stdout.isatty():
         print(_summary(args, found))
     if args.draw is not None:
-        from keystab.figures.overlay import draw_keypoints
-
         said = draw_keypoints(image, found, args.draw, args.colour, args.part, args.enlarge)
         print(f"{args.draw}: {said}", file=sys.stderr)
 
@@ -215,6 +217,8 @@ def _check_outputs(args: argparse.Namespace) -> None:
         check_writable(args.output, FORMATS)
     if args.draw is not None:
         check_writable(args.draw, (".png", ".svg"))
+        if args.draw.exists() and args.picture.exists() and args.draw.samefile(args.picture):
+            raise InputError(f"{args.draw} is the picture itself; give another name to the drawing")
     elif args.part is not None or args.colour is not None or args.enlarge is not None:
         raise InputError("--part, --colour and --enlarge are about a drawing: give --draw FILE.png")
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keystab.errors import InputError
+from keystab.utils.grey_values import grey_unit
 
 __all__ = ["estimated_noise"]
 
@@ -84,7 +85,8 @@ def estimated_noise(image: NDArray[np.float64]) -> float:
             f"the image has {height} x {width} pixels, too few to estimate its noise from: "
             f"give noise, or an image of at least {_SIDE} x {_SIDE} pixels"
         )
-    finest, fine = _energies(image)
+    unit = grey_unit(image)
+    finest, fine = _energies(image / unit)
     order = np.argsort(fine, kind="stable")
     flatter = order[: max(int(_FLATTER * order.size), min(_GROUPS, order.size))]
     groups = [group for group in np.array_split(flatter, _GROUPS) if group.size]
@@ -92,7 +94,7 @@ def estimated_noise(image: NDArray[np.float64]) -> float:
         return 0.0
     of_fine = np.array([fine[group].mean() for group in groups])
     of_finest = np.array([finest[group].mean() for group in groups])
-    return float(np.sqrt(_where_equal(of_fine, of_finest)))
+    return unit * float(np.sqrt(_where_equal(of_fine, of_finest)))
 
 
 def _energies(image: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

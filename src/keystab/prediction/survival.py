@@ -190,7 +190,7 @@ def _drawn(
 
     Which mean and spread, `cumulative` says: their probabilities, added up.
     """
-    spread = np.broadcast_to(spread, mean.shape)
+    spread = np.array(np.broadcast_to(spread, mean.shape))  # of one layout: compiled once
     count = np.empty(len(sign))
     moments = np.empty((len(sign), 3, 3))
     _climb_all(basis, mean, spread, cumulative, offset, sign, grid, _draws(), count, moments)

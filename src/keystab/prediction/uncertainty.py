@@ -22,12 +22,16 @@ from keystab.prediction.survival import after_noise, among_scenes
 from keystab.scalespace.dog import checked_image
 from keystab.scalespace.sampling import balanced_delta
 from keystab.utils import validation
+from keystab.utils.grey_values import grey_unit
 from keystab.utils.progress import progress_if_watched
 
 __all__ = ["keypoint_uncertainty"]
 
 #: Keypoints handled at once: bounds the memory of their covariances to some 50 MB.
 _BATCH = 2048
+
+#: Largest standard deviation of the noise, over the largest grey value.
+_MOST_NOISE = 1e6
 
 
 def keypoint_uncertainty(
@@ -94,8 +98,8 @@ def keypoint_uncertainty(
     Raises
     ------
     InputError
-        As `keystab.detect_keypoints`; for noise that is negative, and for an image too small to
-        estimate noise from.
+        As `keystab.detect_keypoints`; for noise that is negative or out of all proportion to the
+        image, and for an image too small to estimate noise from.
 
     Notes
     -----
@@ -138,7 +142,8 @@ def keypoint_uncertainty(
     """
     array = checked_image(image)
     validation.boolean("noise_free", noise_free)
-    offset, slope = _noise_model(array, noise)
+    unit = grey_unit(array)
+    model = _noise_model(array, noise, unit)
     keypoints = detect_keypoints(
         array,
         camera_blur,
@@ -158,7 +163,7 @@ def keypoint_uncertainty(
     )
     columns: dict[str, NDArray[np.float64]] = {name: np.empty(len(keypoints)) for name in _COLUMNS}
     sampling = (n_spo, delta_min or balanced_delta(n_spo, kappa, sigma_min), sigma_min, refine)
-    jets, level = _at_keypoints(array, keypoints, camera_blur, kappa, (offset, slope))
+    jets, level = _at_keypoints(array / unit, keypoints, camera_blur, kappa, model)
     batches = range(0, len(keypoints), _BATCH)
     for start in progress_if_watched(batches, len(batches), "error bars"):
         rows = slice(start, start + _BATCH)
@@ -166,6 +171,7 @@ def keypoint_uncertainty(
         part = _error_bars(*seen, camera_blur, kappa, sampling, noise_free)
         for name, values in part.items():
             columns[name][rows] = values
+    columns["noise"] *= unit
     return keypoints.assign(**columns)
 
 
@@ -183,11 +189,11 @@ _COLUMNS = (
 
 
 def _noise_model(
-    image: NDArray[np.float64], noise: float | tuple[float, float] | None
+    image: NDArray[np.float64], noise: float | tuple[float, float] | None, unit: float
 ) -> tuple[float, float]:
-    """Variance of the noise at grey value 0, and what it gains per grey value."""
+    """Variance of the noise at grey value 0, and what it gains per grey value; grey in units."""
     if noise is None:
-        return estimated_noise(image) ** 2, 0.0
+        return (estimated_noise(image) / unit) ** 2, 0.0
     if isinstance(noise, (tuple, list, np.ndarray)):
         if len(noise) != 2:
             raise InputError(
@@ -195,8 +201,16 @@ def _noise_model(
                 "a variance of a + b times the grey value: change noise"
             )
         offset, slope = (validation.number("noise", part, least=0) for part in noise)
-        return offset, slope
-    return validation.number("noise", noise, least=0) ** 2, 0.0
+        level = np.sqrt(offset) / unit
+        slope /= unit
+    else:
+        level, slope = validation.number("noise", noise, least=0) / unit, 0.0
+    if max(level, np.sqrt(slope)) > _MOST_NOISE:
+        raise InputError(
+            f"noise is {noise}, more than {_MOST_NOISE:g} times the picture's largest grey value: "
+            "give noise in the units of the picture"
+        )
+    return float(level) ** 2, slope
 
 
 def _at_keypoints(
