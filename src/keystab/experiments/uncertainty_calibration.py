@@ -351,7 +351,9 @@ def reliability_table(
     -------
     DataFrame
         The columns of `by`, ``bin``, ``n``, mean ``predicted_survival``, share ``found`` and its
-        Wilson interval ``low, high``; bins without keypoints are left out.
+        Wilson interval ``low, high``; bins without keypoints are left out. Predicted from a view
+        without noise, each keypoint counts in every pair: bins of few keypoints are off by more
+        than that interval says.
     """
     rows = []
     for key, part in _groups(table, by):

@@ -284,9 +284,9 @@ def _draw_weights(ax: Axes, table: DataFrame) -> None:
             ax.vlines(at, own["ratio_low"], own["ratio_high"], color=colour, linewidth=0.8)
             ax.plot(at, own["ratio"], color=colour, linestyle=line, marker="o", linewidth=1.0,
                     markerfacecolor=face, label=f"{task} {kept}")  # fmt: skip
-    if len(shown):
-        _noise_axis(ax, shown["noise"].unique())
-    ax.set_ylim(0.0, max(1.1, float(shown["ratio_high"].max()) * 1.02 if len(shown) else 0.0))
+    _noise_axis(ax, shown["noise"].unique())
+    low, high = np.nanmin([*shown["ratio_low"], 1.0]), np.nanmax([*shown["ratio_high"], 1.1])
+    ax.set_ylim(low - 0.65 * (high - low), high)
     ax.set_ylabel("error over that of equal weights")
     _name(ax, [*TASKS.values(), ("open: survival ≥ 50 %", palette.GREY)])
 
