@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 from scenes import blobs
 from scipy.special import ndtr
 
@@ -112,6 +113,17 @@ def test_wrong_words_get_one_line(photo, more, words, capsys):
         status, (out, err) = end.code, capsys.readouterr()
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert words in err
+
+
+def test_noise_that_a_jpeg_hides_is_warned_of(tmp_path, capsys):
+    grey = np.random.default_rng(0).integers(0, 256, (24, 24), dtype=np.uint8)
+    for name in ("photo.jpg", "photo.png"):
+        Image.fromarray(grey).save(tmp_path / name)
+        command = "uncertainty PHOTO --camera-blur 0.8 --n-spo 3 --n-oct 1"
+        status, _, err = run(tmp_path / name, command, capsys)
+        assert status == 0 and ("give --noise" in err) is name.endswith(".jpg")
+        status, _, err = run(tmp_path / name, f"{command} --noise 0.01", capsys)
+        assert status == 0 and "give --noise" not in err
 
 
 def test_a_drawing_does_not_replace_the_picture(tmp_path, capsys):

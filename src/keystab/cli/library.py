@@ -116,6 +116,8 @@ def _tabulate(
     if options["camera_blur"] == "auto":
         options["camera_blur"] = _blur_of_edges(args, image)
     _warn_of_coarse_sampling(args)
+    if options.get("noise", 0) is None:
+        _warn_of_compression(args.picture)
     start = time.monotonic()
     with watched():
         found = find(image, **options)
@@ -197,6 +199,18 @@ def _warn_of_coarse_sampling(args: argparse.Namespace) -> None:
         print(
             f"warning: samples {step:g} px apart do not resolve a blur of {args.sigma_min:g} px: "
             "most of what is found will be chance; give a smaller --delta-min",
+            file=sys.stderr,
+        )
+
+
+def _warn_of_compression(picture: Path) -> None:
+    """Say where noise cannot be told from the picture."""
+    with picture.open("rb") as file:
+        jpeg = file.read(3) == b"\xff\xd8\xff"
+    if jpeg:
+        print(
+            f"warning: {picture} is a JPEG, which loses the finest noise, so that too little is "
+            "estimated and error bars are too short; give --noise",
             file=sys.stderr,
         )
 

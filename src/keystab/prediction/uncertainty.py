@@ -126,7 +126,10 @@ def keypoint_uncertainty(
     these are many: on ``casamila`` at 0.003 the survival is then off by 0.067, pooled by 0.032,
     0.020, 0.016.
 
-    JPEGTEXT
+    JPEG hides noise from the estimate, more so the less there is: on shots of ``casamila`` and
+    ``otter`` of quality 90 (6 pairs each), 90 % ellipses hold 0.18, 0.09, 0.92 at noise of 0.003,
+    0.01, 0.03 when it is estimated, and 0.64, 0.86, 0.88 when it is given: compression itself moves
+    keypoints as much as a noise of some 0.004 does. Give `noise` for compressed pictures.
 
     The shift of an extremum whose survival is low is not normal: it is limited by the distance at
     which it would not count as the same. Near the ends of the range of scales that is searched, a
