@@ -237,6 +237,7 @@ class ShotPairs:
     n_pairs_others: Annotated[
         int, Setting("uncertainty.n_pairs_others", "pairs of other views and kinds of noise")
     ]
+    n_moved: Annotated[int, Setting("uncertainty.n_moved", "shots of each moved view")]
     n_spo: Annotated[int, Setting("uncertainty.n_spo", "scales per octave")]
     n_oct: Annotated[int, Setting("uncertainty.n_oct", "octaves")]
 

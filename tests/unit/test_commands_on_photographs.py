@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 from scenes import blobs
 from scipy.special import ndtr
 
@@ -96,6 +97,9 @@ def test_keypoints_are_drawn(photo, tmp_path, command, capsys):
     [
         ("--part 0 0 9 9", "give --draw FILE.png"),
         ("--draw k.pdf", "use .png or .svg"),
+        # Before anything is searched: minutes on a large picture.
+        ("--draw k.png --part 90 0 9 9 -o k.csv", "lies outside of a picture of 50 x 64"),
+        ("--draw k.png --enlarge inf", "the factor of ellipses is inf"),
         ("--n-oct some", "no number of octaves"),
         ("--noise 1 2 3", "give one or two"),
         ("--noise -1", "noise is -1"),
@@ -109,6 +113,27 @@ def test_wrong_words_get_one_line(photo, more, words, capsys):
         status, (out, err) = end.code, capsys.readouterr()
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert words in err
+
+
+def test_noise_that_a_jpeg_hides_is_warned_of(tmp_path, capsys):
+    grey = np.random.default_rng(0).integers(0, 256, (24, 24), dtype=np.uint8)
+    for name in ("photo.jpg", "photo.png"):
+        Image.fromarray(grey).save(tmp_path / name)
+        command = "uncertainty PHOTO --camera-blur 0.8 --n-spo 3 --n-oct 1"
+        status, _, err = run(tmp_path / name, command, capsys)
+        assert status == 0 and ("give --noise" in err) is name.endswith(".jpg")
+        status, _, err = run(tmp_path / name, f"{command} --noise 0.01", capsys)
+        assert status == 0 and "give --noise" not in err
+
+
+def test_a_drawing_does_not_replace_the_picture(tmp_path, capsys):
+    picture = tmp_path / "photo.png"
+    write_picture(np.random.default_rng(0).random((30, 40)), picture)
+    (tmp_path / "same.png").symlink_to(picture)
+    before = picture.read_bytes()
+    command = f"detect PHOTO --camera-blur 0.8 --draw {tmp_path}/same.png"
+    status, _, err = run(picture, command, capsys)
+    assert status == 2 and "is the picture itself" in err and picture.read_bytes() == before
 
 
 def test_the_blur_can_be_told_from_edges(tmp_path, capsys):

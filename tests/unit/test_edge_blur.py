@@ -25,7 +25,7 @@ def edge(blur, angle, shape=(70, 90), offset=0.3):
 
 @pytest.mark.parametrize("blur", [0.6, 0.8, 1.1, 1.6])
 @pytest.mark.parametrize("angle", [0.0, 0.3, 0.8, np.pi / 2, 2.0])
-@pytest.mark.parametrize("height", [1.0, -200.0])
+@pytest.mark.parametrize("height", [1.0, -200.0, 1e300])
 def test_a_step_edge_has_its_blur_at_any_angle_and_height(blur, angle, height):
     found = edge_blur(50 + height * edge(blur, angle))
     assert found.blur == pytest.approx(blur, abs=0.03)

@@ -249,6 +249,16 @@ def test_a_picture_in_other_units_of_grey_has_the_same_error_bars():
     pd.testing.assert_frame_equal(one[names], other[names], rtol=1e-9)
 
 
+def test_grey_values_of_any_size_have_error_bars():
+    image = blobs(36, 44, [(17, 18, 1.9), (20, 29, 1.5)]) + 0.01 * noise_of((36, 44), 1)
+    names = [*ERRORS, "survival", "conditioning"]
+    usual = keystab.keypoint_uncertainty(image, BLUR, n_spo=3)
+    for size in (2.0**-200, 2.0**200):
+        found = keystab.keypoint_uncertainty(size * image, BLUR, n_spo=3)
+        pd.testing.assert_frame_equal(usual[names], found[names], rtol=1e-9)
+        assert found["noise"].to_numpy() / size == pytest.approx(usual["noise"].to_numpy())
+
+
 def test_a_transposed_picture_swaps_y_and_x():
     image = blobs(34, 50, [(17, 18, 1.9), (16, 31, 1.5)], contrast=2.0) + 0.01 * noise_of(
         (34, 50), 2
@@ -335,7 +345,21 @@ def test_noise_that_grows_with_the_grey_value_is_larger_where_it_is_bright():
     pd.testing.assert_frame_equal(plain, constant)
 
 
-@pytest.mark.parametrize("noise", [-0.1, "much", (1.0,), (1, 2, 3), (-1.0, 0.1), (0.1, -1), np.nan])
+@pytest.mark.parametrize(
+    "noise",
+    [
+        -0.1,
+        "much",
+        (1.0,),
+        (1, 2, 3),
+        (-1.0, 0.1),
+        (0.1, -1),
+        np.nan,
+        1e300,
+        (0, 1e300),
+        (1e308, 0),
+    ],
+)
 def test_noise_that_is_none_is_refused_in_one_line(noise):
     with pytest.raises(keystab.InputError, match="noise") as error:
         keystab.keypoint_uncertainty(np.eye(12), BLUR, noise)

@@ -88,6 +88,8 @@ def test_no_keypoints_are_drawn_as_none(tmp_path):
         ({"part": (60, 0, 5, 5)}, "lies outside"),
         ({"part": (0, 0, 0, 5)}, "lies outside"),
         ({"enlarge": 0.0}, "allowed are positive numbers"),
+        ({"enlarge": np.nan}, "allowed are positive numbers"),
+        ({"enlarge": 1e300}, "up to 10000"),
         ({"path": "k.pdf"}, "use .png or .svg"),
     ],
 )

@@ -69,5 +69,5 @@ def test_nothing_is_explained_that_no_stage_takes():
     for name in STAGES:
         main = importlib.import_module(f"keystab.stages.{name}").main
         taken |= set(inspect.signature(main).parameters)
-    further = {f"{name}_digest" for name in ("views", "store", "sets")}
+    further = {f"{name}_digest" for name in ("views", "moved", "store", "sets")}
     assert set(meanings()) == (taken & set(meanings())) | further

@@ -28,38 +28,65 @@ def tables():
     judged = {"method": list(uncertainty.METHODS), "quantity": ["position", "scale"]}
     levels = labelled(**judged, level=[0.5, 0.9, 0.95, 0.99])
     coverage = cases.merge(levels, how="cross")
-    coverage = coverage.assign(held=coverage["level"] - 0.02, low=0.8, high=0.95)
+    coverage = coverage.assign(held=coverage["level"] - 0.02, low=0.8, high=0.95, n=100)
+    # Tables are sorted: the first view, seen with all kinds of noise, need not come first.
+    additive, first = coverage["kind"] == "additive", coverage["blur"] == 0.8
+    other = coverage[additive & first].assign(blur=0.5, held=0.5)
+    coverage = pd.concat([other, coverage[additive | first]])
     strata = labelled(stratum=["octave", *uncertainty.STRATA], part=range(4), **judged, level=[0.9])
     bins = labelled(bin=range(10)).assign(n=50)
     bins["predicted_survival"] = (bins["bin"] + 0.5) / 10
     bins = bins.assign(found=bins["predicted_survival"], low=0.0, high=1.0)
+    asked = {"task": list(uncertainty.TASKS), "weights": ["equal", "octave", "bars"]}
+    weights = labelled(**asked, kept=["all", "surviving"], noise=[0.003, 0.03])
+    weights = weights.assign(ratio=0.7, ratio_low=0.6, ratio_high=0.8)
     guesses = labelled(guess=list(uncertainty.GUESSES)).assign(auc=[0.9, 0.7, 0.6])
     return {
         "uncertainty_coverage": coverage,
         "uncertainty_strata": strata.assign(held=0.88),
         "uncertainty_reliability": cases.merge(bins, how="cross"),
         "uncertainty_separation": cases.merge(guesses, how="cross"),
+        "uncertainty_weights": weights,
     }
 
 
 def test_the_figure_shows_its_tables(tables):
     figure = uncertainty.draw(tables)
     panels = {ax.get_label(): ax for ax in figure.axes}
-    assert set(panels) == set("abcdef")
-    lines = {line.get_label(): line for line in panels["a"].lines}
-    assert lines["bars 0.03"].get_ydata() == pytest.approx([-2.0] * 4)
-    lines = {line.get_label(): line for line in panels["b"].lines}
-    assert lines["estimated shot position"].get_xdata() == pytest.approx([0.003, 0.03])
-    assert lines["shot view scale"].get_ydata() == pytest.approx([88.0, 88.0])
-    assert "blur 1.1" in {line.get_label() for line in panels["c"].lines}
-    lines = {line.get_label(): line for line in panels["d"].lines}
-    assert lines["octave sigma"].get_ydata() == pytest.approx([88.0] * 4)
-    lines = {line.get_label(): line for line in panels["e"].lines}
-    assert lines["0.003"].get_ydata() == pytest.approx(np.arange(5.0, 100, 10))
-    lines = {line.get_label(): line for line in panels["f"].lines}
-    assert lines["contrast"].get_ydata() == pytest.approx([0.7, 0.7])
+    assert set(panels) == set("abcdefghi")
+    lines = {name: {line.get_label(): line for line in ax.lines} for name, ax in panels.items()}
+    assert lines["a"]["bars"].get_ydata() == pytest.approx([-2.0] * 4)
+    assert lines["b"]["estimated shot"].get_xdata() == pytest.approx([0.003, 0.03])
+    assert lines["b"]["estimated shot"].get_ydata() == pytest.approx([88.0, 88.0])
+    assert lines["c"]["shot view"].get_ydata() == pytest.approx([88.0, 88.0])
+    assert lines["d"]["jpeg alone"].get_ydata() == pytest.approx([88.0, 88.0])
+    assert lines["e"]["0.5 known"].get_ydata() == pytest.approx([50.0, 50.0])
+    assert lines["f"]["octave sigma"].get_ydata() == pytest.approx([88.0] * 4)
+    assert lines["g"]["0.003"].get_xdata() == pytest.approx(np.arange(5.0, 100, 10))
+    assert lines["h"]["contrast"].get_ydata() == pytest.approx([0.7, 0.7])
+    assert lines["i"]["homography surviving"].get_ydata() == pytest.approx([0.7, 0.7])
     texts = [text for text in figure.findobj(matplotlib.text.Text) if text.get_text().strip()]
     assert min(text.get_fontsize() for text in texts) >= 7.0
+
+
+def test_names_and_lines_lie_apart(tables):
+    figure = uncertainty.draw(tables)
+    for ax in figure.axes:
+        boxes = [text.get_window_extent() for text in ax.texts]
+        for one, other in itertools.combinations(boxes, 2):
+            assert not one.overlaps(other)
+        for line in ax.lines:
+            points = ax.transData.transform(np.column_stack(line.get_data()).astype(float))
+            for box in boxes:
+                assert line.get_label().startswith("_") or not box.count_contains(points), ax
+
+
+def test_no_motion_leaves_its_panel_empty(tables):
+    nothing = tables["uncertainty_weights"].assign(
+        ratio=np.nan, ratio_low=np.nan, ratio_high=np.nan
+    )
+    figure = uncertainty.draw(tables | {"uncertainty_weights": nothing})
+    assert figure.axes[-1].get_ylim()[1] == 1.1
 
 
 def test_a_missing_column_is_named(tables):

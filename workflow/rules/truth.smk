@@ -264,15 +264,18 @@ rule evaluate_refinement:
 
 
 rule calibrate_bars:
-    """Figure uncertainty: what the error bars of keypoints hold, and what survival says."""
+    """Figure uncertainty: what error bars of keypoints hold, and what they are good for."""
     input:
         views=ancient(f"{HERE}views/shots"),
         views_digest=f"{HERE}views/shots.sha256",
+        moved=ancient(f"{HERE}views/moved"),
+        moved_digest=f"{HERE}views/moved.sha256",
     output:
         coverage=f"{HERE}tables/uncertainty_coverage.csv",
         strata=f"{HERE}tables/uncertainty_strata.csv",
         reliability=f"{HERE}tables/uncertainty_reliability.csv",
         separation=f"{HERE}tables/uncertainty_separation.csv",
+        weights=f"{HERE}tables/uncertainty_weights.csv",
     log:
         f"{LOG}calibrate_bars.log",
     benchmark:

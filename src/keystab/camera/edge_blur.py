@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from keystab.errors import InputError
+from keystab.utils.grey_values import grey_unit
 from keystab.utils.masks import unmasked
 
 __all__ = ["EdgeBlur", "edge_blur"]
@@ -108,7 +109,7 @@ def edge_blur(image: ArrayLike) -> EdgeBlur:
         )
     if not np.isfinite(picture).all():
         raise InputError("the picture holds NaN or infinite values; replace them by finite ones")
-    squares, column = _squares(picture)
+    squares, column = _squares(picture / grey_unit(picture))
     if squares.size < _FEWEST:
         raise InputError(
             f"the picture has {squares.size} pixels on straight, isolated edges, at least "

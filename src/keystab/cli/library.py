@@ -108,10 +108,16 @@ def _tabulate(
 
     _check_outputs(args)
     image = read_picture(args.picture)
+    if args.draw is not None:
+        from keystab.figures.overlay import check_drawing, draw_keypoints
+
+        check_drawing(image.shape, args.part, args.enlarge)
     options = {name: getattr(args, name) for name in args.parameters}
     if options["camera_blur"] == "auto":
         options["camera_blur"] = _blur_of_edges(args, image)
     _warn_of_coarse_sampling(args)
+    if options.get("noise", 0) is None:
+        _warn_of_compression(args.picture)
     start = time.monotonic()
     with watched():
         found = find(image, **options)
@@ -126,8 +132,6 @@ def _tabulate(
     if args.draw is not None or args.output is not None or sys.stdout.isatty():
         print(_summary(args, found))
     if args.draw is not None:
-        from keystab.figures.overlay import draw_keypoints
-
         said = draw_keypoints(image, found, args.draw, args.colour, args.part, args.enlarge)
         print(f"{args.draw}: {said}", file=sys.stderr)
 
@@ -199,6 +203,18 @@ def _warn_of_coarse_sampling(args: argparse.Namespace) -> None:
         )
 
 
+def _warn_of_compression(picture: Path) -> None:
+    """Say where noise cannot be told from the picture."""
+    with picture.open("rb") as file:
+        jpeg = file.read(3) == b"\xff\xd8\xff"
+    if jpeg:
+        print(
+            f"warning: {picture} is a JPEG, which loses the finest noise, so that too little is "
+            "estimated and error bars are too short; give --noise",
+            file=sys.stderr,
+        )
+
+
 def inspect(args: argparse.Namespace) -> None:
     """Say in words what a picture, a store or a table holds."""
     from keystab.io.describe import describe
@@ -215,6 +231,8 @@ def _check_outputs(args: argparse.Namespace) -> None:
         check_writable(args.output, FORMATS)
     if args.draw is not None:
         check_writable(args.draw, (".png", ".svg"))
+        if args.draw.exists() and args.picture.exists() and args.draw.samefile(args.picture):
+            raise InputError(f"{args.draw} is the picture itself; give another name to the drawing")
     elif args.part is not None or args.colour is not None or args.enlarge is not None:
         raise InputError("--part, --colour and --enlarge are about a drawing: give --draw FILE.png")
 

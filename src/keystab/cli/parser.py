@@ -185,13 +185,14 @@ def _simulate_arguments(to: argparse.ArgumentParser) -> None:
 
 def _detect_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=detect)
-    flags = _search_flags(to, n_spo=3, n_oct=1)
+    flags = _search_flags(to, "sign", n_spo=3, n_oct=1)
     to.set_defaults(parameters=[flag.dest for flag in flags])
 
 
 def _uncertainty_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=uncertainty)
-    flags = _search_flags(to, n_spo=15, n_oct="all")
+    colours = ("survival", "sign", "conditioning")
+    flags = _search_flags(to, *colours, n_spo=15, n_oct="all")
     flags.append(
         to.add_argument(
             "--noise", type=float, nargs="+", action=_Noise, metavar="SD",
@@ -218,7 +219,7 @@ class _Noise(argparse.Action):
         setattr(namespace, self.dest, values[0] if len(values) == 1 else tuple(values))
 
 
-def _table_arguments(to: argparse.ArgumentParser) -> argparse.Action:
+def _table_arguments(to: argparse.ArgumentParser, *colours: str) -> argparse.Action:
     """Add picture, table, drawing and camera blur; returns the last."""
     to.add_argument("picture", metavar="PICTURE", type=Path, help=_PICTURE)
     to.add_argument(
@@ -233,8 +234,8 @@ def _table_arguments(to: argparse.ArgumentParser) -> argparse.Action:
         "ellipses where there are error bars",
     )  # fmt: skip
     drawing.add_argument(
-        "--colour", choices=("survival", "sign", "conditioning"), default=argparse.SUPPRESS,
-        help="what colours tell; the first of these that is known if not given",
+        "--colour", choices=colours, default=argparse.SUPPRESS,
+        help=f"what colours tell; {colours[0]} if not given",
     )  # fmt: skip
     drawing.add_argument(
         "--part", type=int, nargs=4, metavar=("Y", "X", "H", "W"), default=argparse.SUPPRESS,
@@ -253,11 +254,11 @@ def _table_arguments(to: argparse.ArgumentParser) -> argparse.Action:
 
 
 def _search_flags(
-    to: argparse.ArgumentParser, n_spo: int, n_oct: int | str
+    to: argparse.ArgumentParser, *colours: str, n_spo: int, n_oct: int | str
 ) -> list[argparse.Action]:
     """Add the parameters of a detection; returns them."""
     return [
-        _table_arguments(to),
+        _table_arguments(to, *colours),
         to.add_argument("--n-spo", type=int, default=n_spo, metavar="N", help="scales per octave"),
         to.add_argument(
             "--delta-min", type=float, metavar="D",
@@ -333,7 +334,7 @@ def _background(text: str) -> float | str:
 def _truth_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(run=truth)
     flags = [
-        _table_arguments(to),
+        _table_arguments(to, "sign", "conditioning"),
         to.add_argument("--sigma-min", type=float, default=1.1, metavar="S", help="first scale"),
         to.add_argument("--sigma-max", type=float, default=2.2, metavar="S", help="last scale"),
         to.add_argument(

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.detection.detector import detect_keypoints
-from keystab.experiments.uncertainty_calibration import SHOTS, judged, noise_argument, shot
+from keystab.experiments.uncertainty_calibration import (
+    SHOTS,
+    coverage_table,
+    judged,
+    noise_argument,
+    reliability_table,
+    separation_table,
+    shot,
+    strata_table,
+)
 from keystab.prediction.uncertainty import keypoint_uncertainty
 
-__all__ = ["Detector", "PREDICTED", "shot_pairs"]
+__all__ = ["PREDICTED", "Calibration", "Detector", "calibration", "shot_pairs"]
 
 PREDICTED = ("shot", "estimated", "view")
 """What error bars are predicted from: one shot whose noise is known, one shot alone, or the view
@@ -31,6 +40,10 @@ class Detector(NamedTuple):
     """Pixels left out at the border of the view."""
     first_scale: float
     """Scales are judged from so many times the first scale on, to as much below the last."""
+
+    def search(self) -> dict[str, Any]:
+        """Options of a search."""
+        return {name: getattr(self, name) for name in ("n_spo", "sigma_min", "kappa", "n_oct")}
 
     def inside(self, keypoints: pd.DataFrame, shape: tuple[int, int]) -> NDArray[np.bool_]:
         """Which keypoints are judged: those that a shift does not take out of what is searched."""
@@ -98,19 +111,12 @@ def _pairs(
 ) -> Iterator[tuple[dict[str, str], pd.DataFrame]]:
     known = noise_argument(kind, level)
 
+    search = detector.search()
+
     def bars(
         image: NDArray[np.float64], noise: float | tuple[float, float] | None, clean: bool
     ) -> pd.DataFrame:
-        return keypoint_uncertainty(
-            image,
-            blur,
-            noise,
-            detector.n_spo,
-            sigma_min=detector.sigma_min,
-            kappa=detector.kappa,
-            n_oct=detector.n_oct,
-            noise_free=clean,
-        )
+        return keypoint_uncertainty(image, blur, noise, noise_free=clean, **search)
 
     def held(
         keypoints: pd.DataFrame, other: pd.DataFrame, image: NDArray[np.float64], shots: int
@@ -123,14 +129,7 @@ def _pairs(
         first, second = (
             shot(view, kind, level, str(blur), str(level), pair, which) for which in range(2)
         )
-        again = detect_keypoints(
-            second,
-            blur,
-            detector.n_spo,
-            sigma_min=detector.sigma_min,
-            kappa=detector.kappa,
-            n_oct=detector.n_oct,
-        )
+        again = detect_keypoints(second, blur, **search)
         of_shot = bars(first, known, False)
         yield {"predicted": "shot", "against": "shot"}, held(of_shot, again, first, 2)
         yield {"predicted": "shot", "against": "view"}, held(of_shot, of_view, first, 1)
@@ -138,3 +137,48 @@ def _pairs(
         if pair < n_estimated:
             alone = bars(first, None, False)
             yield {"predicted": "estimated", "against": "shot"}, held(alone, again, first, 2)
+
+
+class Calibration(NamedTuple):
+    """What is judged of error bars; `keystab.experiments.uncertainty_calibration` has the columns.
+
+    Attributes
+    ----------
+    coverage, reliability, separation : DataFrame
+        By what was predicted from what, kind of noise, blur and noise; the latter two of those
+        held against second shots.
+    strata : DataFrame
+        Of the usual case: the first view with additive noise, predicted from one shot of known
+        noise and held against a second.
+    """
+
+    coverage: pd.DataFrame
+    strata: pd.DataFrame
+    reliability: pd.DataFrame
+    separation: pd.DataFrame
+
+
+def calibration(pairs: pd.DataFrame) -> Calibration:
+    """Judge all pairs of shots.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        From `shot_pairs`, whose first view comes first.
+
+    Returns
+    -------
+    Calibration
+    """
+    usual = {
+        "predicted": "shot", "against": "shot", "kind": "additive", "blur": pairs["blur"].iloc[0]
+    }  # fmt: skip
+    of_usual = (pairs[list(usual)] == pd.Series(usual)).all(axis=1)
+    second = pairs[pairs["against"] == "shot"]
+    by = [*usual, "noise"]
+    return Calibration(
+        coverage_table(pairs, by),
+        strata_table(pairs[of_usual]),
+        reliability_table(second, by),
+        separation_table(second, by),
+    )

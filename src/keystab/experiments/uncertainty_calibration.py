@@ -40,6 +40,7 @@ __all__ = [
     "METHODS",
     "SHOTS",
     "calibrated_factor",
+    "counterparts",
     "coverage_table",
     "judged",
     "noise_argument",
@@ -119,10 +120,13 @@ def _compressed(image: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(iio.imread(file.getvalue(), extension=".jpg"), dtype=np.float64) / 255
 
 
-def returned(
-    keypoints: pd.DataFrame, second: pd.DataFrame, one_to_one: bool = False
-) -> NDArray[np.float64]:
-    r"""Shifts of the keypoints that a second shot has again.
+def counterparts(
+    keypoints: pd.DataFrame,
+    second: pd.DataFrame,
+    one_to_one: bool = False,
+    radius: float = RADIUS,
+) -> NDArray[np.intp]:
+    r"""Rows of the second shot that keypoints of the first are found again in.
 
     Parameters
     ----------
@@ -131,41 +135,63 @@ def returned(
     one_to_one : bool
         Whether a keypoint of the second shot serves one of the first, the nearest, or as many as
         lie near. An extremum that a detector reports twice is one extremum that returns.
+    radius : float
+        Greatest distance in :math:`(\ln\sigma, y/\sigma, x/\sigma)`.
 
     Returns
     -------
-    ndarray, shape (n, 3)
-        :math:`\ln(\sigma_2 / \sigma)` and shift in y and x in pixels, to the nearest of the same
-        sign within `keystab.prediction.survival.RADIUS`; NaN where there is none.
+    ndarray, shape (n,)
+        The nearest of the same sign, -1 where there is none.
 
     Examples
     --------
     >>> first = pd.DataFrame({"y": [5.0, 5.1], "x": [5.0, 5.0], "sigma": [2.0, 2.0], "sign": 1})
     >>> again = pd.DataFrame({"y": [5.2], "x": [5.0], "sigma": [2.0], "sign": 1})
-    >>> [np.isfinite(returned(first, again, way)[:, 0]).tolist() for way in (False, True)]
-    [[True, True], [False, True]]
+    >>> [counterparts(first, again, way).tolist() for way in (False, True)]
+    [[0, 0], [-1, 0]]
     """
-    shifts = np.full((len(keypoints), 3), np.nan)
+    rows = np.full(len(keypoints), -1, dtype=np.intp)
     if not len(second):
-        return shifts
+        return rows
     sigma, y, x, sign = (keypoints[name].to_numpy() for name in ("sigma", "y", "x", "sign"))
     there = second[["y", "x"]].to_numpy()
-    near = cKDTree(there).query_ball_point(np.column_stack([y, x]), RADIUS * sigma)
+    near = cKDTree(there).query_ball_point(np.column_stack([y, x]), radius * sigma)
     i = np.repeat(np.arange(len(keypoints)), [len(others) for others in near])
     j = np.array([other for others in near for other in others], dtype=np.intp)
-    shift = np.column_stack(
-        [np.log(second["sigma"].to_numpy()[j] / sigma[i]), there[j, 0] - y[i], there[j, 1] - x[i]]
-    )
-    distance = np.sqrt(shift[:, 0] ** 2 + (shift[:, 1] ** 2 + shift[:, 2] ** 2) / sigma[i] ** 2)
-    good = (distance < RADIUS) & (second["sign"].to_numpy()[j] == sign[i])
+    away = (there[j, 0] - y[i]) ** 2 + (there[j, 1] - x[i]) ** 2
+    distance = np.sqrt(np.log(second["sigma"].to_numpy()[j] / sigma[i]) ** 2 + away / sigma[i] ** 2)
+    good = (distance < radius) & (second["sign"].to_numpy()[j] == sign[i])
     taken: set[int] = set()
-    done: set[int] = set()
     for pair in np.flatnonzero(good)[np.argsort(distance[good], kind="stable")]:
-        if i[pair] in done or (one_to_one and j[pair] in taken):
-            continue
-        shifts[i[pair]] = shift[pair]
-        done.add(i[pair])
-        taken.add(j[pair])
+        if rows[i[pair]] < 0 and not (one_to_one and j[pair] in taken):
+            rows[i[pair]] = j[pair]
+            taken.add(j[pair])
+    return rows
+
+
+def returned(
+    keypoints: pd.DataFrame, second: pd.DataFrame, one_to_one: bool = False
+) -> NDArray[np.float64]:
+    r"""Shifts of the keypoints that a second shot has again.
+
+    Parameters
+    ----------
+    keypoints, second, one_to_one
+        See `counterparts`.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        :math:`\ln(\sigma_2 / \sigma)` and shift in y and x in pixels; NaN where there is none.
+    """
+    rows = counterparts(keypoints, second, one_to_one)
+    names = ["sigma", "y", "x"]
+    here = keypoints[names].to_numpy(dtype=np.float64)
+    shifts = np.full((len(keypoints), 3), np.nan)
+    found = rows >= 0
+    there = second[names].to_numpy(dtype=np.float64)[rows[found]]
+    shifts[found, 0] = np.log(there[:, 0] / here[found, 0])
+    shifts[found, 1:] = there[:, 1:] - here[found, 1:]
     return shifts
 
 
@@ -325,7 +351,9 @@ def reliability_table(
     -------
     DataFrame
         The columns of `by`, ``bin``, ``n``, mean ``predicted_survival``, share ``found`` and its
-        Wilson interval ``low, high``; bins without keypoints are left out.
+        Wilson interval ``low, high``; bins without keypoints are left out. Predicted from a view
+        without noise, each keypoint counts in every pair: bins of few keypoints are off by more
+        than that interval says.
     """
     rows = []
     for key, part in _groups(table, by):

@@ -12,13 +12,14 @@ from keystab.errors import InputError
 from keystab.figures import palette
 from keystab.figures.style import NORMAL, context
 from keystab.utils.files import check_writable, written_whole
+from keystab.utils.grey_values import grey_unit
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "FORMATS", "draw_keypoints"]
+__all__ = ["COLOURS", "FORMATS", "check_drawing", "draw_keypoints"]
 
 FORMATS = (".png", ".svg")
 """Suffixes of the files that pictures with keypoints are written to."""
@@ -36,7 +37,10 @@ _DPI, _FOOT = 100, 0.75
 """Pixels per inch, and the height in inches of the line below the picture."""
 
 _FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
-"""Factors by which ellipses may be enlarged."""
+"""Factors by which ellipses are enlarged if none is given."""
+
+_LARGEST_FACTOR = 10000.0
+"""Larger ellipses fill any picture, and take for ever."""
 
 
 def draw_keypoints(
@@ -63,8 +67,8 @@ def draw_keypoints(
     part : (int, int, int, int), optional
         First row, first column, height and width of what is drawn; all by default.
     enlarge : float, optional
-        Factor by which ellipses are enlarged; by default the largest of 1, 2, 5, 10 and so on at
-        which half of them stay within their circles. The drawing says which.
+        Factor by which ellipses are enlarged, at most 10000; by default the largest of 1, 2, 5, 10
+        and so on at which half of them stay within their circles. The drawing says which.
 
     Returns
     -------
@@ -75,13 +79,11 @@ def draw_keypoints(
     ------
     InputError
         If the colour is no column of the table, the part lies outside of the picture, the factor
-        is not positive, or the file cannot be written.
+        is not allowed, or the file cannot be written.
     """
     check_writable(path, FORMATS)
     colour = _colour(keypoints, colour)
-    top, left, height, width = _part(image.shape, part)
-    if enlarge is not None and not (np.isfinite(enlarge) and enlarge > 0):
-        raise InputError(f"the factor of ellipses is {enlarge:g}, allowed are positive numbers")
+    top, left, height, width = check_drawing(image.shape, part, enlarge)
     inside = keypoints["y"].between(top - 0.5, top + height - 0.5)
     inside &= keypoints["x"].between(left - 0.5, left + width - 0.5)
     # Those that come back lie on top.
@@ -103,6 +105,42 @@ def draw_keypoints(
     return f"{words}; colour: {colour}"
 
 
+def check_drawing(
+    shape: tuple[int, ...], part: tuple[int, int, int, int] | None, enlarge: float | None
+) -> tuple[int, int, int, int]:
+    """First row and column, height and width of what is drawn.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Height and width of the picture.
+    part, enlarge
+        See `draw_keypoints`.
+
+    Raises
+    ------
+    InputError
+        If the part lies outside of the picture or the factor is not allowed.
+
+    Examples
+    --------
+    >>> check_drawing((60, 100), (50, 0, 20, 30), None)
+    (50, 0, 10, 30)
+    """
+    if enlarge is not None and not 0 < enlarge <= _LARGEST_FACTOR:
+        raise InputError(
+            f"the factor of ellipses is {enlarge:g}, allowed are positive numbers up to "
+            f"{_LARGEST_FACTOR:g}"
+        )
+    top, left, height, width = (0, 0, *shape) if part is None else part
+    if height < 1 or width < 1 or not (0 <= top < shape[0] and 0 <= left < shape[1]):
+        raise InputError(
+            f"the part {top} {left} {height} {width} lies outside of a picture of {shape[0]} x "
+            f"{shape[1]} pixels: give first row, first column, height and width"
+        )
+    return top, left, min(height, shape[0] - top), min(width, shape[1] - left)
+
+
 def _colour(keypoints: pd.DataFrame, colour: str | None) -> str:
     """Column that decides the colour."""
     have = [name for name in COLOURS if name in keypoints]
@@ -114,21 +152,6 @@ def _colour(keypoints: pd.DataFrame, colour: str | None) -> str:
             f"{', '.join(have) or 'none'}"
         )
     return colour
-
-
-def _part(
-    shape: tuple[int, ...], part: tuple[int, int, int, int] | None
-) -> tuple[int, int, int, int]:
-    """First row and column, height and width of what is drawn."""
-    if part is None:
-        return 0, 0, shape[0], shape[1]
-    top, left, height, width = part
-    if height < 1 or width < 1 or not (0 <= top < shape[0] and 0 <= left < shape[1]):
-        raise InputError(
-            f"the part {part} lies outside of a picture of {shape[0]} x {shape[1]} pixels: give "
-            "first row, first column, height and width"
-        )
-    return top, left, min(height, shape[0] - top), min(width, shape[1] - left)
 
 
 def _canvas(crop: NDArray[np.float64], first: tuple[int, int]) -> tuple[Figure, Axes, float]:
@@ -149,6 +172,7 @@ def _canvas(crop: NDArray[np.float64], first: tuple[int, int]) -> tuple[Figure, 
         )
     )
     (top, left), (bottom, right) = first, (first[0] + crop.shape[0], first[1] + crop.shape[1])
+    crop = crop / grey_unit(crop)
     low, high = np.quantile(crop, [0.002, 0.998])
     axes.imshow(
         crop,

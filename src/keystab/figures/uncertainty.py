@@ -1,4 +1,4 @@
-"""Figure uncertainty: what the error bars of keypoints hold, and what their survival says."""
+"""Figure uncertainty: what the error bars of keypoints hold, and what they are good for."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from keystab.figures import palette, style
 from keystab.figures._render import Tables, check_tables, main
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -19,48 +19,63 @@ if TYPE_CHECKING:
 PLACE = ("predicted", "against", "kind", "blur", "noise")
 
 TABLES = {
-    "uncertainty_coverage.csv": (*PLACE, "method", "quantity", "level", "held", "low", "high"),
+    "uncertainty_coverage.csv": (*PLACE, "method", "quantity", "level", "n", "held", "low", "high"),
     "uncertainty_strata.csv": ("stratum", "part", "method", "quantity", "level", "held"),
-    "uncertainty_reliability.csv": (*PLACE, "n", "predicted_survival", "found", "low", "high"),
+    "uncertainty_reliability.csv": (*PLACE, "predicted_survival", "found", "low", "high"),
     "uncertainty_separation.csv": (*PLACE, "guess", "auc"),
+    "uncertainty_weights.csv": (
+        *("task", "noise", "weights", "kept"),
+        *("ratio", "ratio_low", "ratio_high"),
+    ),
 }
 """Files read, with the columns that they must have."""
 
 LEVEL = 0.9
-"""Ellipses that the panels b to e draw."""
+"""Ellipses that all panels but the first draw."""
+
+BLUE, ORANGE, GREEN, VIOLET, _ = palette.PICTURE_COLOURS
 
 METHODS = {
-    "bars": ("error bars", palette.PICTURE_COLOURS[0]),
-    "octave": ("one error per octave", palette.PICTURE_COLOURS[1]),
-    "inverse_hessian": ("inverse Hessian", palette.PICTURE_COLOURS[2]),
+    "bars": ("error bars", BLUE),
+    "inverse_hessian": ("inverse Hessian", GREEN),
+    "octave": ("one per octave", ORANGE),
 }
 """Names and colours of what is judged."""
 
 CASES = {
-    ("shot", "shot"): ("one shot, its noise known", palette.PICTURE_COLOURS[0]),
-    ("estimated", "shot"): ("one shot alone", palette.PICTURE_COLOURS[3]),
-    ("view", "shot"): ("the view without noise", palette.PICTURE_COLOURS[2]),
-    ("shot", "view"): ("one shot, against the view", palette.PICTURE_COLOURS[1]),
+    ("shot", "shot"): ("one shot, noise given", BLUE),
+    ("estimated", "shot"): ("one shot alone", VIOLET),
+    ("view", "shot"): ("noiseless view", GREEN),
+    ("shot", "view"): ("against noiseless view", ORANGE),
 }
-"""What error bars are predicted from and held against."""
+"""What error bars are predicted from; all but the last are held against a second shot."""
 
 KINDS = {
-    "additive": ("additive", palette.PICTURE_COLOURS[0]),
-    "signal": ("signal-dependent", palette.PICTURE_COLOURS[2]),
-    "jpeg": ("JPEG", palette.PICTURE_COLOURS[1]),
+    "additive": ("additive", BLUE),
+    "signal": ("signal-dependent", GREEN),
+    "jpeg": ("JPEG", ORANGE),
 }
 
 STRATA = {"sigma": "scale", "conditioning": "conditioning", "contrast": "contrast"}
 
 GUESSES = {
-    "survival": ("survival", palette.PICTURE_COLOURS[0]),
-    "contrast": ("contrast", palette.PICTURE_COLOURS[1]),
-    "conditioning": ("conditioning", palette.PICTURE_COLOURS[2]),
+    "survival": ("survival", BLUE),
+    "contrast": ("contrast", ORANGE),
+    "conditioning": ("conditioning", GREEN),
 }
+
+TASKS = {
+    "translation": ("translation", BLUE),
+    "homography": ("homography", ORANGE),
+    "triangulation": ("depth", GREEN),
+}
+"""What keypoints are asked for, and colours."""
+
+KNOWN, ALONE = ("shot", "shot"), ("estimated", "shot")
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
-    """Draw coverage, reliability and separation.
+    """Draw coverage, reliability, separation, and what weights are good for.
 
     Parameters
     ----------
@@ -72,9 +87,10 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     Returns
     -------
     matplotlib Figure
-        a: coverage of ellipses of four probabilities; b: of 90 % ellipses by what they are
-        predicted from and held against; c: by kind of noise and camera blur; d: in quarters of the
-        keypoints; e: reliability of survival; f: areas under ROC curves.
+        a: coverage of ellipses of four probabilities; b, c: of 90 % ellipses of the position and
+        intervals of the scale, by what they are predicted from and held against; d: by kind of
+        noise; e: by camera blur; f: in quarters of the keypoints; g: reliability of survival; h:
+        areas under ROC curves; i: errors of motion and depth with weights over those without.
 
     Raises
     ------
@@ -83,110 +99,129 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     """
     check_tables(tables, TABLES)
     coverage = tables["uncertainty_coverage"]
-    blur = coverage["blur"].iloc[0]  # the first view is written first
+    blur = _first_blur(coverage)
+    bars = coverage[(coverage["method"] == "bars") & (coverage["level"] == LEVEL)]
+    position = bars[bars["quantity"] == "position"]
+    additive = bars[(bars["kind"] == "additive") & (bars["blur"] == blur)]
     with style.context():
-        figure = style.new_figure(4.4)
-        axes = style.panels(figure.add_gridspec(1, 1)[0], 2, 3, hspace=0.05, wspace=0.05).ravel()
+        figure = style.new_figure(6.6)
+        grid = figure.add_gridspec(1, 1)[0]
+        axes = style.panels(grid, 3, 3, hspace=0.05, wspace=0.05).ravel()
         titles = (
-            "what ellipses hold",
-            "predicted from",
-            "noise and blur",
-            "quarters of the keypoints",
-            "survival",
-            "what tells who returns",
-        )
-        for ax, name, title in zip(axes, "abcdef", titles, strict=True):
+            "what ellipses hold", "position: predicted from", "scale: predicted from",
+            "kinds of noise", "blur of the camera", "quarters of the keypoints",
+            "survival", "what tells who returns", "errors with weights",
+        )  # fmt: skip
+        for ax, name, title in zip(axes, "abcdefghi", titles, strict=True):
             style.letter(ax, name, title)
         _draw_levels(axes[0], _usual(coverage, blur))
-        _draw_cases(
-            axes[1], coverage[(coverage["kind"] == "additive") & (coverage["blur"] == blur)]
-        )
-        _draw_kinds(axes[2], coverage, blur)
-        _draw_strata(axes[3], tables["uncertainty_strata"])
-        _draw_reliability(axes[4], _usual(tables["uncertainty_reliability"], blur))
-        _draw_areas(axes[5], _usual(tables["uncertainty_separation"], blur))
+        for ax, quantity in zip(axes[1:3], ("position", "scale"), strict=True):
+            _draw_cases(ax, additive[additive["quantity"] == quantity])
+        _draw_kinds(axes[3], position[position["blur"] == blur])
+        _draw_blurs(axes[4], position[position["kind"] == "additive"])
+        _draw_strata(axes[5], tables["uncertainty_strata"])
+        _draw_reliability(axes[6], _usual(tables["uncertainty_reliability"], blur))
+        _draw_areas(axes[7], _usual(tables["uncertainty_separation"], blur))
+        _draw_weights(axes[8], tables["uncertainty_weights"])
         for ax in axes:
             style.finish_axes(ax)
         return style.settle(figure, draft)
 
 
+def _first_blur(table: DataFrame) -> float:
+    """Blur of the first view, the one that is seen with all kinds of noise."""
+    others = table[table["kind"] != "additive"]
+    return float((others if len(others) else table)["blur"].iloc[0])
+
+
 def _usual(table: DataFrame, blur: float) -> DataFrame:
     """Rows of the first view with additive noise, predicted from one shot and held against one."""
-    return table[
-        (table["predicted"] == "shot")
-        & (table["against"] == "shot")
-        & (table["kind"] == "additive")
-        & (table["blur"] == blur)
-    ]
+    rows = _case(table, KNOWN)
+    return rows[(rows["kind"] == "additive") & (rows["blur"] == blur)]
+
+
+def _case(table: DataFrame, case: tuple[str, str]) -> DataFrame:
+    return table[(table["predicted"] == case[0]) & (table["against"] == case[1])]
 
 
 def _draw_levels(ax: Axes, rows: DataFrame) -> None:
-    """Draw what ellipses hold beyond what they should, at every noise, for every method."""
+    """Draw what ellipses hold beyond what they should, all noises together and their range."""
     position = rows[rows["quantity"] == "position"]
-    ax.axhline(0.0, color=palette.GREY, linewidth=0.7, linestyle=":")
-    for method, (_, colour) in METHODS.items():
-        for noise, part in position[position["method"] == method].groupby("noise"):
-            part = part.sort_values("level")
-            ax.plot(
-                range(len(part)), 100 * (part["held"] - part["level"]), "o-", color=colour,
-                linewidth=0.9, label=f"{method} {noise:g}",
-            )  # fmt: skip
     levels = np.sort(position["level"].unique())
+    ax.axhline(0.0, color=palette.GREY, linewidth=0.7, linestyle=":")
+    for shift, (method, (_, colour)) in zip((-0.13, 0.0, 0.13), METHODS.items(), strict=True):
+        own = position[position["method"] == method]
+        beyond = 100 * (own["held"] - own["level"])
+        together = (own["n"] * beyond).groupby(own["level"]).sum()
+        together /= own["n"].groupby(own["level"]).sum()
+        ends = beyond.groupby(own["level"]).agg(["min", "max"])
+        at = shift + np.arange(len(together))
+        ax.vlines(at, ends["min"], ends["max"], color=colour, linewidth=1.0)
+        ax.plot(at, together, "o-", color=colour, linewidth=1.0, label=method)
     ax.set_xticks(range(len(levels)), [f"{100 * level:.0f}" for level in levels])
-    ax.set_xlabel("ellipse (%)")
-    ax.set_ylabel("held beyond that (points)")
-    _name(ax, METHODS.values())
+    low, high = ax.get_ylim()
+    ax.set_ylim(low - 0.45 * (high - low), high)
+    ax.set_xlabel("ellipses that should hold (%)")
+    ax.set_ylabel("hold beyond that (points)")
+    _name(ax, list(METHODS.values()))
 
 
 def _draw_cases(ax: Axes, rows: DataFrame) -> None:
-    """Draw what 90 % ellipses hold against noise, by what they are predicted from."""
-    rows = rows[(rows["method"] == "bars") & (rows["level"] == LEVEL)]
-    for (predicted, against), (_, colour) in CASES.items():
-        own = rows[(rows["predicted"] == predicted) & (rows["against"] == against)]
-        _draw_lines(ax, own, colour, f"{predicted} {against}")
+    """Draw what is held against noise, by what it is predicted from."""
+    for case, (_, colour) in CASES.items():
+        _draw_line(ax, _case(rows, case), colour, f"{case[0]} {case[1]}")
     _coverage_axis(ax, rows)
-    _name(ax, CASES.values())
+    _name(ax, list(CASES.values()))
 
 
-def _draw_kinds(ax: Axes, rows: DataFrame, blur: float) -> None:
-    """Draw what 90 % ellipses hold against noise, by its kind, and for other blurs."""
-    rows = rows[(rows["method"] == "bars") & (rows["level"] == LEVEL)]
-    rows = rows[(rows["predicted"] == "shot") & (rows["against"] == "shot")]
+def _draw_kinds(ax: Axes, rows: DataFrame) -> None:
+    """Draw what is held against noise by its kind; dashed where it is estimated."""
     for kind, (_, colour) in KINDS.items():
-        _draw_lines(ax, rows[(rows["kind"] == kind) & (rows["blur"] == blur)], colour, kind)
-    others = [each for each in sorted(rows["blur"].unique()) if each != blur]
-    lines = ("--", ":", "-.", (0, (1, 3)))
-    for other, line in zip(others, lines, strict=False):
-        part = rows[(rows["blur"] == other) & (rows["quantity"] == "position")]
-        part = part.sort_values("noise")
-        ax.plot(part["noise"], 100 * part["held"], color=palette.INK, linestyle=line,
-                label=f"blur {other:g}")  # fmt: skip
+        own = rows[rows["kind"] == kind]
+        _draw_line(ax, _case(own, KNOWN), colour, f"{kind} known")
+        _draw_line(ax, _case(own, ALONE), colour, f"{kind} alone", (0, (2.5, 1.2)))
     _coverage_axis(ax, rows)
-    _name(ax, [*KINDS.values(), *((f"blur {other:g} px", palette.INK) for other in others)])
+    _name(ax, [*KINDS.values(), ("dashed: estimated", palette.GREY)])
 
 
-def _draw_lines(ax: Axes, rows: DataFrame, colour: str, label: str) -> None:
-    """Draw the coverage of positions with its interval, and that of scales dashed."""
-    for quantity, line in (("position", "-"), ("scale", (0, (2, 1)))):
-        part = rows[rows["quantity"] == quantity].sort_values("noise")
-        if quantity == "position":
-            ax.fill_between(
-                part["noise"], 100 * part["low"], 100 * part["high"], color=colour, alpha=0.15,
-                linewidth=0,
-            )  # fmt: skip
-        ax.plot(part["noise"], 100 * part["held"], color=colour, linestyle=line,
-                linewidth=1.1, label=f"{label} {quantity}")  # fmt: skip
+def _draw_blurs(ax: Axes, rows: DataFrame) -> None:
+    """Draw what is held against noise by the camera's blur; dashed where noise is estimated."""
+    colours = palette.sweep_colours(rows["blur"].unique())
+    for blur, colour in colours.items():
+        own = rows[rows["blur"] == blur]
+        _draw_line(ax, _case(own, KNOWN), colour, f"{blur:g} known")
+        _draw_line(ax, _case(own, ALONE), colour, f"{blur:g} alone", (0, (2.5, 1.2)))
+    _coverage_axis(ax, rows)
+    names = [(f"{blur:g} px", colour) for blur, colour in colours.items()]
+    _name(ax, [*names, ("dashed: estimated", palette.GREY)])
+
+
+def _draw_line(ax: Axes, rows: DataFrame, colour: Any, label: str, line: Any = "-") -> None:
+    """Draw a coverage with its interval against noise."""
+    rows = rows.sort_values("noise")
+    ends = (100 * rows["low"], 100 * rows["high"])
+    ax.fill_between(rows["noise"], *ends, color=colour, alpha=0.12, linewidth=0)
+    ax.plot(rows["noise"], 100 * rows["held"], color=colour, linestyle=line, linewidth=1.2,
+            marker="o", markersize=2.4, label=label)  # fmt: skip
 
 
 def _coverage_axis(ax: Axes, rows: DataFrame) -> None:
-    """Mark what 90 % ellipses should hold, on axes that begin where the data do."""
+    """Mark what should be held, and leave room for names below what is."""
     ax.axhline(100 * LEVEL, color=palette.GREY, linewidth=0.7, linestyle=":")
     noise = np.sort(rows["noise"].unique())
-    style.log_x_axis(ax, noise[0] / 1.15, noise[-1] * 1.15)
-    low = min(80.0, 100 * float(rows["held"].min()) - 2)
-    ax.set_ylim(low - 0.6 * (100 - low), 100.0)
-    ax.set_xlabel("noise")
+    _noise_axis(ax, noise)
+    low = min(82.0, 100 * float(rows["low"].min()) - 1)
+    # Names stand on the right, where noise is large: what dips on the left needs no room below.
+    least = min(82.0, 100 * float(rows.loc[rows["noise"] == noise[-1], "low"].min()) - 1)
+    ax.set_ylim(min(low, least - 0.6 * (100 - least)), 100.0)
     ax.set_ylabel(f"held by {100 * LEVEL:.0f} % ellipses (%)")
+
+
+def _noise_axis(ax: Axes, noise: Any) -> None:
+    noise = np.sort(noise)
+    style.log_x_axis(ax, noise[0] / 1.15, noise[-1] * 1.15)
+    ax.set_xlim(noise[0] / 1.15, noise[-1] * 1.15)
+    ax.set_xlabel("noise (grey range 1)")
 
 
 def _draw_strata(ax: Axes, table: DataFrame) -> None:
@@ -199,11 +234,14 @@ def _draw_strata(ax: Axes, table: DataFrame) -> None:
         for method, (_, colour) in METHODS.items():
             part = rows[(rows["stratum"] == stratum) & (rows["method"] == method)]
             held = 100 * part.set_index("part")["held"].reindex(range(4)).to_numpy()
-            ax.plot(at, held, "o-", color=colour, linewidth=0.9, label=f"{method} {stratum}")
+            ax.plot(at, held, "o-", color=colour, linewidth=1.0, label=f"{method} {stratum}")
         ticks.append(float(at.mean()))
+    low, high = ax.get_ylim()
+    ax.set_ylim(low - 0.35 * (high - low), high)
     ax.set_xticks(ticks, [f"{name}\nlow to high" for name in STRATA.values()])
     ax.tick_params(axis="x", length=0)
     ax.set_ylabel(f"held by {100 * LEVEL:.0f} % ellipses (%)")
+    _name(ax, list(METHODS.values()))
 
 
 def _draw_reliability(ax: Axes, rows: DataFrame) -> None:
@@ -214,8 +252,11 @@ def _draw_reliability(ax: Axes, rows: DataFrame) -> None:
         part = rows[rows["noise"] == noise]
         x = 100 * part["predicted_survival"]
         ax.vlines(x, 100 * part["low"], 100 * part["high"], color=colour, linewidth=0.8)
-        ax.plot(x, 100 * part["found"], "o-", color=colour, linewidth=0.9, label=f"{noise:g}")
-    ax.set(xlim=(0, 100), ylim=(0, 100))
+        # Of bins that hold a handful, the interval says all.
+        sure = part["high"] - part["low"] < 0.3
+        ax.plot(x, (100 * part["found"]).where(sure), "o-", color=colour, linewidth=1.0,
+                label=f"{noise:g}")  # fmt: skip
+    ax.set(xlim=(0, 100), ylim=(0, 101))
     ax.set_xlabel("survival (%)")
     ax.set_ylabel("found again (%)")
     _name(ax, [(f"noise {noise:g}", colour) for noise, colour in colours.items()])
@@ -225,20 +266,36 @@ def _draw_areas(ax: Axes, rows: DataFrame) -> None:
     """Draw the areas under ROC curves against noise."""
     for guess, (_, colour) in GUESSES.items():
         part = rows[rows["guess"] == guess].sort_values("noise")
-        ax.plot(part["noise"], part["auc"], "o-", color=colour, linewidth=1.1, label=guess)
-    noise = np.sort(rows["noise"].unique())
-    style.log_x_axis(ax, noise[0] / 1.15, noise[-1] * 1.15)
-    ax.set_ylim(0.4, 1.0)
-    ax.set_xlabel("noise")
+        ax.plot(part["noise"], part["auc"], "o-", color=colour, linewidth=1.2, label=guess)
+    _noise_axis(ax, rows["noise"].unique())
+    ax.set_ylim(min(0.4, float(rows["auc"].min()) - 0.02), 1.0)
     ax.set_ylabel("area under the ROC curve")
-    _name(ax, GUESSES.values())
+    _name(ax, list(GUESSES.values()))
 
 
-def _name(ax: Axes, names: Iterable[tuple[str, Any]]) -> None:
+def _draw_weights(ax: Axes, table: DataFrame) -> None:
+    """Draw errors with weights, and without low survival, over those of all alike."""
+    shown = table[table["weights"] == "bars"]
+    ax.axhline(1.0, color=palette.GREY, linewidth=0.7, linestyle=":")
+    for place, (task, (_, colour)) in enumerate(TASKS.items()):
+        for kept, line, face in (("all", "-", colour), ("surviving", (0, (2.5, 1.2)), "white")):
+            own = shown[(shown["task"] == task) & (shown["kept"] == kept)].sort_values("noise")
+            at = own["noise"] * 1.05 ** (place - 1)
+            ax.vlines(at, own["ratio_low"], own["ratio_high"], color=colour, linewidth=0.8)
+            ax.plot(at, own["ratio"], color=colour, linestyle=line, marker="o", linewidth=1.0,
+                    markerfacecolor=face, label=f"{task} {kept}")  # fmt: skip
+    _noise_axis(ax, shown["noise"].unique())
+    low, high = np.nanmin([*shown["ratio_low"], 1.0]), np.nanmax([*shown["ratio_high"], 1.1])
+    ax.set_ylim(low - 0.65 * (high - low), high)
+    ax.set_ylabel("error over that of equal weights")
+    _name(ax, [*TASKS.values(), ("open: survival ≥ 50 %", palette.GREY)])
+
+
+def _name(ax: Axes, names: Sequence[tuple[str, Any]]) -> None:
     """Write names in their colours in the lower right corner."""
     place = {"transform": ax.transAxes, "ha": "right", "va": "bottom", "fontsize": style.SMALL}
-    for line, (text, colour) in enumerate(reversed(list(names))):
-        ax.text(0.98, 0.02 + 0.085 * line, text, color=colour, **place)
+    for line, (text, colour) in enumerate(reversed(names)):
+        ax.text(0.99, 0.02 + 0.085 * line, text, color=colour, **place)
 
 
 if __name__ == "__main__":

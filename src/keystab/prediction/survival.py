@@ -130,8 +130,7 @@ def among_scenes(
     Outcome
         Of a shift from the extremum of the one shot to that of the other.
     """
-    root = np.linalg.cholesky(_regular(scene_jets(kappa)))
-    whitening = np.linalg.inv(root)
+    root, whitening = _scene_axes(kappa)
     power, axes = np.linalg.eigh(whitening @ _regular(noise) @ whitening.T)
     power = np.maximum(power, 0.0)[:, None, :]  # of the noise, where the scene's is z
     seen = np.einsum("nij,ni->nj", axes, _at_extremum(jets) @ whitening.T)[:, None, :]
@@ -161,6 +160,13 @@ def _regular(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @cache
+def _scene_axes(kappa: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Root of the covariance of scenes, and its inverse: the same for all pictures."""
+    root = np.asarray(np.linalg.cholesky(_regular(scene_jets(kappa))), np.float64)
+    return root, np.asarray(np.linalg.inv(root), np.float64)
+
+
+@cache
 def _draws() -> NDArray[np.float64]:
     """Points of a scrambled Sobol sequence: normal numbers, and one that is uniform."""
     from scipy.special import ndtri
@@ -184,7 +190,7 @@ def _drawn(
 
     Which mean and spread, `cumulative` says: their probabilities, added up.
     """
-    spread = np.broadcast_to(spread, mean.shape)
+    spread = np.array(np.broadcast_to(spread, mean.shape))  # of one layout: compiled once
     count = np.empty(len(sign))
     moments = np.empty((len(sign), 3, 3))
     _climb_all(basis, mean, spread, cumulative, offset, sign, grid, _draws(), count, moments)

@@ -84,6 +84,9 @@ Error bars
     strata : the same in parts of the keypoints
     reliability : table of what returns, against what was predicted
     separation : table of how well guesses tell what returns
+    moved : store of views from different places
+    moved_digest : checksums of the store of these views
+    weights : table of the errors of motion and depth from weighted keypoints
 
 Theory
     profiles : table of profiles of point spread functions

@@ -1,4 +1,4 @@
-"""Hold the error bars of keypoints against second shots of the same views (figure uncertainty)."""
+"""Hold the error bars of keypoints against second shots, and weigh by them."""
 
 from pathlib import Path
 
@@ -9,6 +9,7 @@ from keystab.stages._command import Store, command
 @command
 def main(
     views: Store,
+    moved: Store,
     scales: Scales,
     border: float,
     first_scale: float,
@@ -18,39 +19,24 @@ def main(
     strata: Path,
     reliability: Path,
     separation: Path,
+    weights: Path,
 ) -> None:
-    """Read views without noise; draw pairs of shots; write what the error bars hold."""
-    from keystab.experiments.shot_pairs import Detector, shot_pairs
-    from keystab.experiments.uncertainty_calibration import (
-        coverage_table,
-        reliability_table,
-        separation_table,
-        strata_table,
-    )
+    """Read views without noise; draw shots; write what the error bars hold and are good for."""
+    from keystab.experiments.keypoint_weights import moved_shots, weights_table
+    from keystab.experiments.shot_pairs import Detector, calibration, shot_pairs
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_views
 
     detector = Detector(
-        shots.n_spo,
-        scales.sigma_min,
-        scales.kappa,
-        shots.n_oct,
-        border,
-        first_scale,
+        shots.n_spo, scales.sigma_min, scales.kappa, shots.n_oct, border, first_scale
     )
     images = [(view.image, view.blur) for view in read_views(*views)]
-    table = shot_pairs(images, shots.noise, shots.n_pairs, shots.n_pairs_others, detector)
-    by = ["predicted", "against", "kind", "blur", "noise"]
-    usual = table[
-        (table["predicted"] == "shot")
-        & (table["against"] == "shot")
-        & (table["kind"] == "additive")
-        & (table["blur"] == images[0][1])
-    ]
-    second = table[table["against"] == "shot"]
-    held = coverage_table(table, by)
-    write_table(held, coverage)
-    write_table(strata_table(usual), strata)
-    write_table(reliability_table(second, by), reliability)
-    write_table(separation_table(second, by), separation)
-    print(held[(held["method"] == "bars") & (held["level"] == 0.9)].to_string(index=False))
+    numbers = (shots.noise, shots.n_pairs, shots.n_pairs_others)
+    judged = calibration(shot_pairs(images, *numbers, detector))
+    others = read_views(*moved)
+    seen = ([view.image for view in others], others.specs, others.reference_shape)
+    asked = moved_shots(*seen, shots.noise, shots.n_moved, detector.search())
+    for path, table in zip((coverage, strata, reliability, separation), judged, strict=True):
+        write_table(table, path)
+    write_table(weights_table(asked, shots.noise), weights)
+    print(judged.coverage.query("method == 'bars' and level == 0.9").to_string(index=False))

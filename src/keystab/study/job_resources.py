@@ -76,8 +76,9 @@ def minutes_of_shots(settings: Settings) -> int:
     # view, other views without them.
     pairs = asked["n_pairs"] + 4 * asked["n_pairs_others"]
     scales = asked["n_spo"] * asked["n_oct"]
-    seconds = 5 * SECONDS * pixels(settings, "shots")[0] * scales
-    return _minutes(seconds * pairs * len(asked["noise"]))
+    shots = 5 * pairs * pixels(settings, "shots")[0]
+    shots += 2 * asked["n_moved"] * pixels(settings, "moved")[0]
+    return _minutes(SECONDS * scales * shots * len(asked["noise"]))
 
 
 def megabytes_of_reference(settings: Settings) -> int:

@@ -90,6 +90,7 @@ FIGURES = {
             "uncertainty_strata.csv",
             "uncertainty_reliability.csv",
             "uncertainty_separation.csv",
+            "uncertainty_weights.csv",
         )
     ),
     # whether one detection shows that it is unstable
