@@ -45,7 +45,7 @@ def test_nothing_is_allowed_that_is_not_said():
 
 @pytest.mark.parametrize("path", TABLES, ids=[path.stem for path in TABLES])
 def test_a_forgery_in_the_sixth_digit_or_by_one_is_found_in_any_column(path):
-    table = read_table(path)
+    table = read_table(path).head(300)
     allowed = allowed_in(path.stem, table.columns)
     assert difference(table, table.copy(), allowed).words == ""
     for column, values in table.items():

@@ -364,12 +364,10 @@ def fit_camera(what: Camera) -> GaussianFit:
     # A lens that is far out of focus makes rings, and so more than one maximum: the range between
     # a fraction of the finest detail and the extent of the widest disc is searched first.
     widest = 4 * (what.side + (1 + 8 * (abs(what.w20) + abs(what.w40))) / what.cutoff)
-    grid = np.linspace(
-        math.log(0.02 * widest / (1 + what.side * what.cutoff)), math.log(widest), 160
-    )
+    least = 0.02 * widest / (1 + what.side * what.cutoff)
+    grid = np.linspace(math.log(least), math.log(widest), 160)
     best = int(np.argmax([explained(math.exp(log_blur)) for log_blur in grid]))
     ends = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
-    # What is explained is greatest where the derivative of the overlap times the blur is zero.
     blur = math.exp(root_between(lambda log_blur: nodes.slope(math.exp(log_blur)), *ends))
     return GaussianFit(
         blur=blur / what.pitch,
@@ -435,7 +433,7 @@ class _Spectrum:
         return float((self.weight * self.mean * gaussian).sum())
 
     def slope(self, blur: float) -> float:
-        """Derivative of the blur times the overlap, with respect to the blur."""
+        """Derivative of the blur times the overlap, whose square is what is explained."""
         square = (2 * np.pi * blur * self.frequency) ** 2
         return float((self.weight * self.mean * np.exp(-square / 2) * (1 - square)).sum())
 
