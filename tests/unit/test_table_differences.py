@@ -97,6 +97,7 @@ def test_a_count_that_differs_by_one_is_one_keypoint():
     assert two.words.endswith("one keypoint in each of 2 rows")
     many = difference(COUNTS, COUNTS.assign(n_common=[90, 97, 99]))
     assert "keypoint" not in many.words and "95 became 97" in many.words
+    assert "keypoint" not in difference(COUNTS, COUNTS.assign(n_spo=[3, 4, 6])).words
 
 
 @pytest.mark.parametrize("row", range(4))

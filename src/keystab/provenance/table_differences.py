@@ -21,6 +21,8 @@ __all__ = ["Allowed", "AllowedIn", "Difference", "difference", "file_difference"
 AllowedIn = Mapping[str, Allowed] | Allowed
 """What floating-point numbers may differ by: by column, or in all columns."""
 
+_NUMBERS_OF_SETTINGS = ("n_spo", "n_passes", "n_views", "n_samples", "n_blocks")
+
 _MOST_MORE_ROWS = 3
 """Rows that one table may have more than another and still be compared with it row by row."""
 
@@ -172,7 +174,7 @@ def _one_keypoint(columns: list[_Column], expected: pd.DataFrame, found: pd.Data
     What follows from counts, shares and medians, differs with them.
     """
     beyond = [it for it in columns if it.excess > 1]
-    counts = [it for it in beyond if it.name.startswith("n_")]
+    counts = [it for it in beyond if not _is_key(it.name)]
     if not counts or any(it.distance.max() != 1 for it in counts):
         whole = [it for it in beyond if not it.is_float]
         return _told(max(whole or beyond, key=lambda it: it.excess), expected, found, "")
@@ -188,8 +190,8 @@ def _one_keypoint(columns: list[_Column], expected: pd.DataFrame, found: pd.Data
 
 
 def _is_key(name: str) -> bool:
-    """Whether a column says what a row is about, and not what was found."""
-    return name == "n_spo" or not name.startswith("n_")
+    """Whether a column says what a row is about, and not how much was found."""
+    return not name.startswith("n_") or name in _NUMBERS_OF_SETTINGS
 
 
 def _short(value: object) -> str:
