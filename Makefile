@@ -57,7 +57,7 @@ report: study ## One HTML file with figures, verdicts, costs and provenance, aft
 	python tools/report.py $(OVERLAY)
 
 why: environment ## What would run, why, and for how long (TARGET=figures/fig5.pdf: for one file)
-	@python tools/why.py $(TARGET) $(OVERLAY)
+	@python tools/why.py $(if $(TARGET),'$(subst ','\'',$(TARGET))') $(OVERLAY)
 
 test: environment ## All tests
 	pytest -n 2 --dist loadfile -m "not slow"

@@ -128,10 +128,15 @@ def existing(folder: Path) -> Path:
 
 
 def wrong_file(arguments: list[str]) -> str:
-    """What is wrong with a file of settings among the arguments, which Snakemake would not say."""
+    """What is wrong with settings or this shell's memory, which Snakemake would not say."""
     from keystab.errors import InputError
     from keystab.study.settings import read_yaml
+    from keystab.utils.memory import require_start
 
+    try:
+        require_start()
+    except InputError as problem:
+        return str(problem)
     for name in ("config/config.yaml", *config_files(arguments)):
         if not Path(name).is_file():
             return f"{name}: no such file of settings; check WITH="

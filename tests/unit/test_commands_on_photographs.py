@@ -83,6 +83,13 @@ def test_a_pipe_gets_the_table_and_a_terminal_a_summary(photo, monkeypatch, caps
     assert "estimated from the picture" in out and "-o TABLE.csv" in out
 
 
+def test_where_a_file_gets_the_table_a_pipe_gets_nothing(photo, tmp_path, capsys):
+    command = f"detect PHOTO --camera-blur 0.8 -o {tmp_path}/found.csv"
+    status, out, err = run(photo, command, capsys)
+    assert (status, out) == (0, "") and "maxima, minima" in err
+    assert len(read_table(tmp_path / "found.csv")) > 5
+
+
 @pytest.mark.parametrize("command", ["detect", "truth", "uncertainty"])
 def test_keypoints_are_drawn(photo, tmp_path, command, capsys):
     more = " --sigma-max 1.5 --n-spo 4" if command == "truth" else " --n-oct 1"

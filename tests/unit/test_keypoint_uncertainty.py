@@ -259,6 +259,28 @@ def test_grey_values_of_any_size_have_error_bars():
         assert found["noise"].to_numpy() / size == pytest.approx(usual["noise"].to_numpy())
 
 
+def test_eigenvectors_of_another_processor_give_the_same_survival(monkeypatch):
+    image = blobs(36, 44, [(17, 18, 1.9), (20, 29, 1.5)]) + 0.01 * noise_of((36, 44), 1)
+    one = keystab.keypoint_uncertainty(image, BLUR, 0.02)
+    eigh, draw = np.linalg.eigh, np.random.default_rng(3)
+
+    def otherwise(matrices):
+        """Eigenvectors with other signs, and of equal eigenvalues turned: as good as those."""
+        values, axes = eigh(matrices)
+        axes = axes * draw.choice([-1.0, 1.0], size=(*axes.shape[:-2], 1, axes.shape[-1]))
+        for k in range(values.shape[-1] - 1):
+            near = abs(values[..., k + 1] - values[..., k]) < 1e-12 * abs(values[..., -1])
+            first, second = axes[near, :, k], axes[near, :, k + 1]
+            axes[near, :, k] = 0.6 * first + 0.8 * second
+            axes[near, :, k + 1] = 0.6 * second - 0.8 * first
+        return values, axes
+
+    monkeypatch.setattr(np.linalg, "eigh", otherwise)
+    other = keystab.keypoint_uncertainty(image, BLUR, 0.02)
+    assert one["survival"].between(0.05, 0.95).any()
+    pd.testing.assert_frame_equal(one, other, rtol=1e-9)
+
+
 def test_a_transposed_picture_swaps_y_and_x():
     image = blobs(34, 50, [(17, 18, 1.9), (16, 31, 1.5)], contrast=2.0) + 0.01 * noise_of(
         (34, 50), 2

@@ -88,6 +88,18 @@ def test_the_fit_of_the_profile_is_the_fit_of_the_picture():
     assert fitted_blur(profile) == pytest.approx(sd, rel=1e-7)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_no_other_width_explains_what_the_fit_leaves(method):
+    profile = blob_profile(121, 1.1)
+    for _ in range(10):
+        profile = blur_profile(profile, 1.3, method)
+    bump = blob_profile(121, fitted_blur(profile))
+    wider = bump * (np.arange(121) - 60) ** 2
+    # To rounding; a search for the least misfit, which is flat, leaves a million times as much.
+    left = profile - (profile @ bump) / (bump @ bump) * bump
+    assert abs(left @ wider) < 1e-14 * (profile @ wider)
+
+
 def test_the_residual_is_that_of_the_pictures():
     single, repeated = np.array([0.5, 2.0, 0.5]), np.array([0.5, 1.8, 0.6])
     assert semigroup_residual(repeated, single) == pytest.approx((4.0 - 1.8**2) / 4.0)

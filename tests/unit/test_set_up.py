@@ -6,6 +6,7 @@ import hashlib
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -82,3 +83,41 @@ def test_a_profile_is_taken_where_it_is_asked_for(checkout):
     run(checkout, "make", "study", "PROFILE=profiles/slurm")
     said = (checkout / "said").read_text()
     assert "|--profile|profiles/slurm|" in said and "--cores" not in said
+
+
+def test_a_file_name_with_a_blank_is_one_target_of_why(checkout):
+    run(checkout, "make", "why", "TARGET=my roof/it's fig4.pdf")
+    assert "tools/why.py|my roof/it's fig4.pdf|PYTHONPATH" in (checkout / "said").read_text()
+    run(checkout, "make", "why")
+    assert (checkout / "said").read_text().endswith("tools/why.py|PYTHONPATH=\n")
+
+
+NEW_PYTHON = """#!/bin/sh
+# Stands for a Python that makes .venv, and for that in it: says what pip would go by.
+case "$*" in
+    *"-m venv"*) mkdir -p .venv/bin && cp "$0" .venv/bin/python ;;
+    *"config list"*) printf '%s\\n' "global.index-url='https://mirror'" "install.target='/opt'" \\
+        "install.no-deps='true'" "global.find-links='\\\\n/one\\\\n/two three'" "user.cert='x'" ;;
+    *pip_mirrors*) exec {python} "$@" ;;
+    *"pip "*install*) env | grep ^PIP_ | sort >>said ;;
+esac
+"""
+
+
+def test_of_pip_conf_only_mirrors_are_taken(checkout, tmp_path):
+    shutil.rmtree(checkout / ".venv")
+    shutil.copy(ROOT / "tools/pip_mirrors.py", checkout / "tools/pip_mirrors.py")
+    python = tmp_path / "python"
+    python.write_text(NEW_PYTHON.replace("{python}", sys.executable))
+    python.chmod(0o755)
+    own = {"PIP_PROXY": "http://proxy", "PIP_TARGET": "/opt", "PIP_FIND_LINKS": "/mine"}
+    done = run(checkout, "tools/environment", PYTHON=str(python), **own)
+    assert done.returncode == 0, done.stderr
+    said = set((checkout / "said").read_text().splitlines())
+    wanted = {
+        "PIP_CONFIG_FILE=/dev/null",
+        "PIP_INDEX_URL=https://mirror",
+        "PIP_PROXY=http://proxy",
+        "PIP_FIND_LINKS=/mine",
+    }
+    assert wanted <= said and not [it for it in said if "TARGET" in it or "NO_DEPS" in it]

@@ -65,6 +65,22 @@ def test_rivals_get_the_factor_that_suits_them_best_in_the_middle():
     assert half["held"].to_numpy() == pytest.approx(0.5, abs=0.01)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_rounding_does_not_decide_over_the_keypoint_in_the_middle(seed):
+    draw = np.random.default_rng(seed)
+    table = pd.DataFrame({"found": np.full(4001, True), "group": draw.integers(0, 40, 4001)})
+    table["kind"] = table["group"]  # rivals get a factor for each kind
+    columns = [f"{quantity}_octave" for quantity in ("position", "scale")]
+    table[columns] = draw.chisquare(2, (4001, 2))
+    held = coverage_table(table, ["group"], methods=["octave"])
+    half = held[held["level"] == 0.5]
+    assert (half["n"] % 2 == 1).any()
+    assert (2 * half["held"] * half["n"]).round().tolist() == (half["n"] + half["n"] % 2).tolist()
+    other = table.copy()
+    other[columns] *= 1 + 1e-15 * draw.standard_normal((4001, 2))
+    assert coverage_table(other, ["group"], methods=["octave"]).equals(held)
+
+
 def test_error_bars_that_are_half_as_long_hold_less():
     table = keypoints(1500)
     second = moved(table, 5)

@@ -25,9 +25,9 @@ H the transfer function, the best height leaves
 
 .. math:: |h|^2 - 4 \pi c^2 \left( \int H(f) e^{-2 \pi^2 c^2 |f|^2} df \right)^2,
 
-and c is where the second term is greatest. Only the mean of H over directions enters, which makes
-the integral one-dimensional. Lengths are in micrometres of the image plane and frequencies in
-cycles per micrometre, unless they are said to be in pixels.
+and c is where the second term is greatest, a root of its derivative. Only the mean of H over
+directions enters, which makes the integral one-dimensional. Lengths are in micrometres of the image
+plane and frequencies in cycles per micrometre, unless they are said to be in pixels.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from keystab.errors import InputError
 from keystab.utils import validation
+from keystab.utils.roots import root_between
 
 Array = NDArray[np.float64]
 
@@ -355,29 +356,23 @@ def fit_camera(what: Camera) -> GaussianFit:
     >>> [round(fit_camera(Camera(0.5, N, 0.1)).blur * 0.1 / (0.5 * N), 3) for N in (4, 8)]
     [0.412, 0.412]
     """
-    from scipy.optimize import minimize_scalar
-
     nodes = _Spectrum.of(what)
 
-    def explained(log_blur: float) -> float:
-        blur = math.exp(log_blur)
-        return -4 * math.pi * blur**2 * nodes.overlap(blur) ** 2
+    def explained(blur: float) -> float:
+        return 4 * math.pi * blur**2 * nodes.overlap(blur) ** 2
 
     # A lens that is far out of focus makes rings, and so more than one maximum: the range between
     # a fraction of the finest detail and the extent of the widest disc is searched first.
     widest = 4 * (what.side + (1 + 8 * (abs(what.w20) + abs(what.w40))) / what.cutoff)
-    grid = np.linspace(
-        math.log(0.02 * widest / (1 + what.side * what.cutoff)), math.log(widest), 160
-    )
-    best = int(np.argmin([explained(log_blur) for log_blur in grid]))
-    bounds = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
-    found = minimize_scalar(explained, bounds=bounds, method="bounded", options={"xatol": 1e-10})
-    blur = math.exp(found.x)
-    height = nodes.overlap(blur) * 2.0
+    least = 0.02 * widest / (1 + what.side * what.cutoff)
+    grid = np.linspace(math.log(least), math.log(widest), 160)
+    best = int(np.argmax([explained(math.exp(log_blur)) for log_blur in grid]))
+    ends = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
+    blur = math.exp(root_between(lambda log_blur: nodes.slope(math.exp(log_blur)), *ends))
     return GaussianFit(
         blur=blur / what.pitch,
-        height=height,
-        residual=math.sqrt(max(1 + explained(found.x) / nodes.energy, 0.0)),
+        height=nodes.overlap(blur) * 2.0,
+        residual=math.sqrt(max(1 - explained(blur) / nodes.energy, 0.0)),
     )
 
 
@@ -436,6 +431,11 @@ class _Spectrum:
         """Integral of the transfer function times that of a Gaussian of integral 1."""
         gaussian = np.exp(-2 * (np.pi * blur * self.frequency) ** 2)
         return float((self.weight * self.mean * gaussian).sum())
+
+    def slope(self, blur: float) -> float:
+        """Derivative of the blur times the overlap, whose square is what is explained."""
+        square = (2 * np.pi * blur * self.frequency) ** 2
+        return float((self.weight * self.mean * np.exp(-square / 2) * (1 - square)).sum())
 
 
 def _unit_nodes(least: int) -> tuple[Array, Array]:

@@ -130,7 +130,8 @@ def _tabulate(
     octaves = f" in {_octaves(options['n_oct'])}" if "n_oct" in options else ""
     print(f"{args.picture}: {len(found)} {noun}{octaves}, {seconds:.1f} s", file=sys.stderr)
     if args.draw is not None or args.output is not None or sys.stdout.isatty():
-        print(_summary(args, found))
+        # Where nobody looks, standard output is for rows: a program that reads it finds none.
+        print(_summary(args, found), file=None if sys.stdout.isatty() else sys.stderr)
     if args.draw is not None:
         said = draw_keypoints(image, found, args.draw, args.colour, args.part, args.enlarge)
         print(f"{args.draw}: {said}", file=sys.stderr)

@@ -15,8 +15,12 @@ from pathlib import Path
 from keystab.cli.parser import BAD_INPUT, build_parser
 from keystab.errors import InputError
 from keystab.provenance.compiled_loops import forget_outdated
+from keystab.utils.memory import require_start, too_little
 
 __all__ = ["main"]
+
+_LIGHT = ("inspect", "simulate", "blur", "whence")
+"""Commands that compile nothing and draw nothing."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -37,11 +41,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     forget_outdated()
     status = None
     try:
+        if args.command not in _LIGHT:
+            require_start()
         status = args.run(args)
         sys.stdout.flush()
     except InputError as error:
         return _refuse(args, str(error))
-    except RuntimeError as error:
+    except (MemoryError, ImportError, RuntimeError) as error:
+        if told := too_little(error):
+            return _refuse(args, f"{told}; use a smaller picture or coarser steps")
         if "no locator available" not in str(error):  # how numba says it
             raise
         return _refuse(
@@ -50,8 +58,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             "folder; set the environment variable NUMBA_CACHE_DIR to a folder that can be written "
             "to",
         )
-    except MemoryError:
-        return _refuse(args, "the memory does not suffice; use a smaller picture or coarser steps")
     except BrokenPipeError:  # whoever read the output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:

@@ -51,7 +51,7 @@ def verify(args: argparse.Namespace) -> int:
 
     integer("cores", args.cores, least=1)  # Snakemake waits for ever for the first of none
     for name in ("rtol", "atol"):
-        number(name, getattr(args, name), least=0)
+        number(name, getattr(args, name) or 0, least=0)
     project = find_project()
     start = time.monotonic()
     if args.archive is None:
@@ -86,10 +86,11 @@ def verify(args: argparse.Namespace) -> int:
 def _recompute(args: argparse.Namespace, held: Unpacked, project: Path) -> bool:
     """Compute figures again with the code that is here; whether the numbers are the same."""
     from keystab.provenance import recomputation, verification
+    from keystab.provenance.table_differences import Allowed
 
     print(f"recomputing {' '.join(args.recompute)} with the code of {project}", flush=True)
-    checks, same = recomputation.recompute(
-        held, project, args.recompute, args.cores, args.rtol, args.atol
-    )
+    given = (args.rtol, args.atol)
+    allowed = None if given == (None, None) else Allowed(*(it or 0.0 for it in given))
+    checks, same = recomputation.recompute(held, project, args.recompute, args.cores, allowed)
     print(f"recomputed {' '.join(args.recompute)}\n{verification.report(checks)}")
     return same

@@ -280,6 +280,10 @@ def calibrated_factor(squared: NDArray[np.float64], dimensions: int) -> float:
     return float(np.median(squared) / chi2.ppf(0.5, dimensions))
 
 
+_AT_LIMIT = 1 + 1e-9
+"""Of an odd number of keypoints one lies on the ellipse that holds half of them, by the choice of
+the rivals' factor: it is in, and rounding does not decide."""
+
 FITTED = ("predicted", "against", "kind", "blur", "noise")
 """Columns of a table in whose groups rivals are scaled: as if they knew the noise."""
 
@@ -326,7 +330,8 @@ def coverage_table(
             for key, part in _groups(found, by):
                 values = squared.loc[part.index]
                 for level in LEVELS:
-                    k, n = int((values <= chi2.ppf(level, dimensions)).sum()), len(values)
+                    limit = chi2.ppf(level, dimensions) * _AT_LIMIT
+                    k, n = int((values <= limit).sum()), len(values)
                     low, high = wilson_interval(k, n)
                     rows.append(
                         {"method": method, "quantity": quantity, **key, "level": level, "n": n}

@@ -8,7 +8,9 @@ what it was drawn from.
 from __future__ import annotations
 
 import argparse
+import errno
 import sys
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +20,7 @@ from keystab.errors import InputError
 from keystab.figures import style
 from keystab.io.figure_metadata import PNG_KEY, FigureMetadata, digests_of
 from keystab.utils.files import written_whole
+from keystab.utils.memory import require_start
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -103,9 +106,16 @@ def save(
     try:
         with style.context(draft), written_whole(path) as part:
             figure.savefig(part, format=kind, metadata=fields)
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"{path}: cannot be written ({reason}); choose another folder") from None
+    except (OSError, zlib.error) as error:
+        # Closing a PDF that could not be written to, its stream fails as well.
+        first = error if isinstance(error, OSError) else error.__context__
+        if not isinstance(first, OSError):
+            raise
+        reason = first.strerror or first
+        advice = "choose another folder"
+        if first.errno == errno.EFBIG:
+            advice = "raise the limit of the size of files (ulimit -f)"
+        raise InputError(f"{path}: cannot be written ({reason}); {advice}") from None
 
 
 def main(
@@ -140,6 +150,7 @@ def main(
     )
     args = parser.parse_args(argv)
     try:
+        require_start()
         if args.pdf is None and args.png is None:
             raise InputError("nothing to write: give --pdf, --png or both")
         tables = read_tables(args.tables, needs)
@@ -152,5 +163,8 @@ def main(
             print(f"wrote {path}")
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 2
+    except MemoryError:
+        print("error: the memory does not suffice to draw this figure", file=sys.stderr)
         return 2
     return 0

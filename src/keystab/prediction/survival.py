@@ -101,9 +101,9 @@ def after_noise(
     mean = _at_extremum(jets)
     root = np.asarray(np.linalg.cholesky(_regular(noise)), np.float64)
     certain = np.ones((len(jets), 1))
-    return _drawn(
-        root, np.zeros((len(jets), 1, _N)), certain[:, :, None], certain, mean, sign, grid
-    )
+    turned = np.broadcast_to(np.eye(_N), root.shape)
+    nothing = np.zeros((len(jets), 1, _N))
+    return _drawn(root, turned, nothing, certain[:, :, None], certain, mean, sign, grid)
 
 
 def among_scenes(
@@ -141,7 +141,8 @@ def among_scenes(
     cumulative = np.cumsum(weight / weight.sum(axis=1, keepdims=True), axis=1)
     share = z / total
     spread = np.sqrt(power * (1 + share))
-    return _drawn(root @ axes, share * seen, spread, cumulative, np.zeros_like(jets), sign, grid)
+    offset = np.zeros_like(jets)
+    return _drawn(root @ axes, axes, share * seen, spread, cumulative, offset, sign, grid)
 
 
 def _at_extremum(jets: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -179,6 +180,7 @@ def _draws() -> NDArray[np.float64]:
 
 def _drawn(
     basis: NDArray[np.float64],
+    axes: NDArray[np.float64],
     mean: NDArray[np.float64],
     spread: NDArray[np.float64],
     cumulative: NDArray[np.float64],
@@ -188,12 +190,14 @@ def _drawn(
 ) -> Outcome:
     """Outcome when jets are offset + basis (mean + spread times normal numbers).
 
-    Which mean and spread, `cumulative` says: their probabilities, added up.
+    Which mean and spread, `cumulative` says: their probabilities, added up. The normal numbers are
+    the components of the same vectors along `axes`: eigenvectors have no sign, and those of equal
+    eigenvalues no direction, of their own, so that processors would give each keypoint other draws.
     """
     spread = np.array(np.broadcast_to(spread, mean.shape))  # of one layout: compiled once
     count = np.empty(len(sign))
     moments = np.empty((len(sign), 3, 3))
-    _climb_all(basis, mean, spread, cumulative, offset, sign, grid, _draws(), count, moments)
+    _climb_all(basis, axes, mean, spread, cumulative, offset, sign, grid, _draws(), count, moments)
     missing = np.maximum(_FEW - count, 0)[:, None, None]
     moments += missing * _BALL * np.eye(3)
     moments /= np.maximum(count, _FEW)[:, None, None]
@@ -201,7 +205,7 @@ def _drawn(
 
 
 @njit(cache=True, nogil=True)
-def _climb_all(basis, mean, spread, cumulative, offset, sign, grid, draws, count, moments):  # noqa: PLR0913
+def _climb_all(basis, axes, mean, spread, cumulative, offset, sign, grid, draws, count, moments):  # noqa: PLR0913
     size = mean.shape[2]
     place, jet, coordinate = np.empty(3), np.empty(size), np.empty(size)
     moments[:] = 0.0
@@ -211,8 +215,12 @@ def _climb_all(basis, mean, spread, cumulative, offset, sign, grid, draws, count
             k = 0
             while k < cumulative.shape[1] - 1 and cumulative[point, k] < draw[size]:
                 k += 1
+            coordinate[:] = 0.0
+            for m in range(size):
+                for i in range(size):
+                    coordinate[i] += axes[point, m, i] * draw[m]
             for i in range(size):
-                coordinate[i] = mean[point, k, i] + spread[point, k, i] * draw[i]
+                coordinate[i] = mean[point, k, i] + spread[point, k, i] * coordinate[i]
             for i in range(size):
                 jet[i] = offset[point, i]
                 for m in range(size):

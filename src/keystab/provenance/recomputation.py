@@ -8,7 +8,6 @@ from pathlib import Path, PurePosixPath
 
 from keystab.errors import InputError
 from keystab.io.checksums import read_sums
-from keystab.provenance import table_differences
 from keystab.provenance.archived_settings import place_settings
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.result_checks import Check, left_out_digests
@@ -18,6 +17,7 @@ from keystab.provenance.snakemake_records import Record, read_records
 from keystab.provenance.study_folder import Study
 from keystab.provenance.unpacking import Unpacked
 from keystab.provenance.verification import copy_workflow
+from keystab.study.column_tolerances import Allowed
 
 __all__ = ["recompute"]
 
@@ -27,8 +27,7 @@ def recompute(
     project: Path,
     targets: Sequence[str],
     cores: int,
-    rtol: float = table_differences.RTOL,
-    atol: float = table_differences.ATOL,
+    allowed: Allowed | None = None,
 ) -> tuple[list[Check], bool]:
     """Compute figures again from the picture on and compare with a run.
 
@@ -45,7 +44,7 @@ def recompute(
         Names of figures, such as ``fig5``; or ``all``.
     cores : int
         Jobs at a time.
-    rtol, atol : float, optional
+    allowed : Allowed, optional
         See `compare_tables`.
 
     Returns
@@ -82,7 +81,7 @@ def recompute(
             if path.startswith(f"{study.results}/tables/")
         ]
         checks = [
-            compare_tables(source, scratch / study.results, study.lock_digest, tables, rtol, atol),
+            compare_tables(source, scratch / study.results, study.lock_digest, tables, allowed),
             _compare_figures(source, study, records, about),
         ]
         if everything:

@@ -9,10 +9,10 @@ import csv
 import dataclasses
 import io
 import json
-import math
 import re
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
+from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -48,6 +48,7 @@ FINAL = "final.sha256"
 _SUM = re.compile("([0-9a-f]{64})  ([^\n]+)\n")
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _MOST_ROWS_OF_JOIN = 5_000_000
+_ROUNDING = Decimal("1e-12")
 _VERDICTS = ("claims.csv", "claims.json", "claims.md")
 
 
@@ -283,13 +284,30 @@ def _other_verdicts(before: Mapping[str, str], after: Mapping[str, str]) -> Iter
 
 
 def _but_for_rounding(one: Path, other: Path) -> bool:
-    """Whether two texts hold the same words, and numbers that differ by rounding at most."""
+    """Whether two texts hold the same words, and numbers that differ by rounding at most.
+
+    That is by one in the last digit that is written, or in the thirteenth; whole numbers by none.
+    """
     texts = [path.read_text(encoding="utf-8") for path in (one, other)]
     words, numbers = zip(*((_NUMBER.split(it), _NUMBER.findall(it)) for it in texts), strict=True)
-    return words[0] == words[1] and all(
-        math.isclose(float(a), float(b), rel_tol=2e-3, abs_tol=1e-9)
-        for a, b in zip(*numbers, strict=True)
-    )
+    return words[0] == words[1] and all(map(_same_number, *numbers))
+
+
+def _same_number(one: str, other: str) -> bool:
+    """Whether two numbers are the same but for rounding; both were given the same digits.
+
+    Examples
+    --------
+    >>> _same_number("0.12", "0.1201"), _same_number("120", "121"), _same_number("0.12", "0.1202")
+    (True, False, False)
+    """
+    if one == other:
+        return True
+    a, b = Decimal(one), Decimal(other)
+    last = min(int(a.as_tuple().exponent), int(b.as_tuple().exponent))
+    if last >= 0 and "e" not in one + other:
+        return False
+    return abs(a - b) <= max(Decimal(1).scaleb(last), abs(a) * _ROUNDING, _ROUNDING)
 
 
 def verdicts_in(path: Path) -> dict[str, str]:

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from keystab.errors import InputError
 from keystab.scalespace.cosine_series import gaussian
+from keystab.utils.roots import root_between
 
 Profile = NDArray[np.float64]
 
@@ -163,7 +164,8 @@ def fitted_blur(profile: Profile) -> float:
     that of the fit of a two-dimensional Gaussian to the picture ``outer(profile, profile)``: with
     ``g`` the Gaussian's profile, the best amplitude leaves ``|p|**2 - <p, g>**2 / |g|**2`` on one
     axis and ``|p|**4 - (<p, g>**2 / |g|**2)**2`` in the picture, and both are least where
-    ``<p, g>**2 / |g|**2`` is greatest.
+    ``<p, g>**2 / |g|**2`` is greatest: where the mean square distance from the middle is the same
+    under the weights ``p g`` and ``g g``.
 
     Parameters
     ----------
@@ -180,22 +182,21 @@ def fitted_blur(profile: Profile) -> float:
     >>> round(fitted_blur(3.0 * blob_profile(41, 1.7)), 12)
     1.7
     """
-    from scipy.optimize import least_squares
-
     squared = (np.arange(len(profile)) - (len(profile) - 1) / 2) ** 2
-    start = [profile.max(), sqrt(float((profile * squared).sum() / profile.sum()))]
+    start = sqrt(float((profile * squared).sum() / profile.sum()))
 
-    def misfit(parameters: Profile) -> Profile:
-        amplitude, sd = parameters
-        return np.asarray(amplitude * np.exp(-0.5 * squared / sd**2) - profile)
-
-    def slope(parameters: Profile) -> Profile:
-        amplitude, sd = parameters
+    def slope(sd: float) -> float:
+        """Derivative of ``<p, g>**2 / |g|**2``, but for factors that are positive where p fits."""
         bump = np.exp(-0.5 * squared / sd**2)
-        return np.stack([bump, amplitude * bump * squared / sd**3], axis=1)
+        wider = bump * squared
+        return float((profile @ wider) / (profile @ bump) - (bump @ wider) / (bump @ bump))
 
-    fit = least_squares(misfit, start, jac=slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    return abs(float(fit.x[1]))
+    low = high = start
+    while slope(low) < 0:
+        low /= 1.1
+    while slope(high) > 0:
+        high *= 1.1
+    return root_between(slope, low, high)
 
 
 def semigroup_residual(repeated: Profile, single: Profile) -> float:

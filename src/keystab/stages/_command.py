@@ -24,6 +24,9 @@ from typing import NamedTuple
 
 from keystab.errors import InputError
 from keystab.utils.command_line import read_arguments
+from keystab.utils.memory import require_start, too_little
+
+_OF_THE_SYSTEM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
 
 
 class Store(NamedTuple):
@@ -60,19 +63,22 @@ def command(function: Callable[..., None]) -> Callable[..., int]:
         if argv is None:
             settle_process()
         arguments = read_arguments(function, argv, meanings())
-        if "NUMBA_CACHE_DIR" not in os.environ:
-            # Not a plain import: it changes no result, and what a stage imports is in its digest.
-            import_module("keystab.provenance.compiled_loops").forget_outdated()
         try:
+            require_start()
+            if "NUMBA_CACHE_DIR" not in os.environ:
+                # No plain import: it changes no result, and what a stage imports is in its digest.
+                import_module("keystab.provenance.compiled_loops").forget_outdated()
             function(**arguments)
         except InputError as error:
             print(f"error: {error}", file=sys.stderr)
             return 2
-        except MemoryError as error:
-            print(f"error: the memory does not suffice: {error}", file=sys.stderr)
+        except (MemoryError, ImportError, RuntimeError) as error:
+            if not (told := too_little(error)):
+                raise
+            print(f"error: {told}: {error}", file=sys.stderr)
             return 2
         except OSError as error:
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES):
+            if error.errno not in _OF_THE_SYSTEM:
                 raise
             print(f"error: {error.filename or 'output'}: {error.strerror}", file=sys.stderr)
             return 2

@@ -176,8 +176,9 @@ def _name(target: Path, part: Path, error: OSError) -> None:
     def named(text: object) -> str:
         return str(text).replace(str(part), str(target))
 
-    if error.errno is None:
+    if error.errno is None:  # how numpy says that less was written than it had
         error.args = tuple(map(named, error.args))
+        error.strerror, error.filename = ", ".join(error.args), str(target)
     else:
         error.strerror = named(error.strerror)
         error.filename = str(target) if error.filename is None else named(error.filename)
