@@ -240,7 +240,7 @@ def phase_pattern(phases: Phases, tolerance: float = 0.25) -> str:
     -------
     {"none", "swapped offsets", "no offsets", "some", ""}
         The patterns of `phase_regression`; "some" for a dependence that is none of them: a number
-        farther from 0 than `tolerance` and than its interval. Empty where nothing is known.
+        farther from 0 than `tolerance` and than twice its interval. Empty where nothing is known.
 
     Examples
     --------
@@ -255,7 +255,7 @@ def phase_pattern(phases: Phases, tolerance: float = 0.25) -> str:
     for name, pattern in patterns.items():
         if (np.abs(m - np.array(pattern)) <= tolerance).all():
             return name
-    return "some" if (np.abs(m) > np.maximum(tolerance, phases.half_width)).any() else "none"
+    return "some" if (np.abs(m) > np.maximum(tolerance, 2 * phases.half_width)).any() else "none"
 
 
 def drift(errors: ArrayLike, positions: ArrayLike, extent: tuple[float, float]) -> list[Estimate]:

@@ -306,7 +306,8 @@ def angles(keypoints: pd.DataFrame) -> NDArray[np.float64]:
     """Angles of keypoints in radians, 0 where there are none."""
     if "angle" not in keypoints:
         return np.zeros(len(keypoints))
-    return np.nan_to_num(keypoints["angle"].to_numpy(dtype=float))
+    known: NDArray[np.float64] = np.nan_to_num(keypoints["angle"].to_numpy(dtype=float))
+    return known
 
 
 def _column(keypoints: pd.DataFrame, name: str) -> NDArray[np.float64]:

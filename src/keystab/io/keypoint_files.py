@@ -180,7 +180,7 @@ def _from_csv(path: Path, convention: Convention) -> pd.DataFrame:
     if missing:
         raise InputError(f"lacks the column {missing[0]}; a table of keypoints has y, x and sigma")
     own = convention.table(*(table[name] for name in (*convention.order, "sigma")))
-    return table.assign(**{name: own[name] for name in own})
+    return table.assign(y=own["y"], x=own["x"], sigma=own["sigma"])
 
 
 def _rows(lines: list[str], n_columns: int, more: bool = False) -> NDArray[np.float64]:
