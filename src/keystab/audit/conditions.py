@@ -26,7 +26,19 @@ from keystab.camera.views import ViewSpec, to_reference, to_view
 from keystab.errors import InputError
 from keystab.truth.scene_extrema import scene_extrema
 
-__all__ = ["BLOBS", "Condition", "Plan", "Stage", "View", "blobs", "conditions", "stage_of"]
+__all__ = [
+    "BLOBS",
+    "Condition",
+    "Plan",
+    "QUICK",
+    "Stage",
+    "View",
+    "blobs",
+    "conditions",
+    "made_picture",
+    "stage_of",
+    "taken",
+]
 
 KAPPA = 2 ** (1 / 3)
 LOW, HIGH = 1.4, 5.6
@@ -260,13 +272,12 @@ def made_picture(height: int = 800, width: int = 1360) -> NDArray[np.float64]:
     n = int(height * width / 60)
     radius = _RADII[0] / np.sqrt(1 - draw.random(n) * (1 - (_RADII[0] / _RADII[1]) ** 2))
     centres = draw.random((n, 2)) * (height, width)
+    rows, columns = np.arange(height)[:, None], np.arange(width)[None, :]
     for (y, x), r, grey in zip(centres, radius, draw.uniform(0.05, 0.95, n), strict=True):
-        rows, columns = (
-            np.arange(max(0, math.ceil(at - r)), min(size, math.floor(at + r) + 1))
-            for at, size in ((y, height), (x, width))
-        )
-        part = picture[rows[:1].sum() :, columns[:1].sum() :][: len(rows), : len(columns)]
-        part[(rows[:, None] - y) ** 2 + (columns[None, :] - x) ** 2 <= r**2] = grey
+        down = slice(max(0, math.ceil(y - r)), math.floor(y + r) + 1)
+        across = slice(max(0, math.ceil(x - r)), math.floor(x + r) + 1)
+        inside = (rows[down] - y) ** 2 + (columns[:, across] - x) ** 2 <= r**2
+        picture[down, across][inside] = grey
     return picture
 
 
@@ -280,10 +291,9 @@ def conditions(plan: Plan) -> dict[str, list[ViewSpec]]:
     """
     n = plan.n_views
 
-    def views(count: int, **more: float) -> list[ViewSpec]:
+    def views(count: int, blur: float = BLUR) -> list[ViewSpec]:
         shifts = 4 * (spread_points(count) - 0.5)  # all phases of samples up to four pixels apart
-        given = {"blur": BLUR, "step": STEP} | more
-        return [ViewSpec(shape=(1, 1), shift=(float(y), float(x)), **given) for y, x in shifts]
+        return [ViewSpec(blur, STEP, (1, 1), (float(y), float(x))) for y, x in shifts]
 
     found = {"translations": views(2 * n)}
     found |= {f"blur {blur}": views(n, blur=blur) for blur in (0.3, 0.5, 0.8, 1.1)}
@@ -328,7 +338,7 @@ def blobs(plan: Plan) -> Condition:
         apart = math.ceil(_APART * size)
         n = plan.blobs
         phases = 4 * spread_points(n * n).reshape(n, n, 2)
-        grid = np.stack(np.mgrid[1 : n + 1, 1 : n + 1], axis=-1) * apart
+        grid = np.moveaxis(np.mgrid[1 : n + 1, 1 : n + 1], 0, -1) * apart
         centres = (grid + phases).reshape(-1, 2)
         side = (n + 1) * apart + 4
         variance = size**2 + BLUR**2
@@ -354,4 +364,5 @@ def spread_points(n: int) -> NDArray[np.float64]:
     [0.5, 0.5]
     """
     steps = np.array([1 / _GOLDEN, 1 / _GOLDEN**2])
-    return (0.5 + np.arange(1, n + 1)[:, None] * steps) % 1.0
+    points: NDArray[np.float64] = (0.5 + np.arange(1, n + 1)[:, None] * steps) % 1.0
+    return points

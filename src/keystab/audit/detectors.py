@@ -77,9 +77,9 @@ def _skimage(upsampling: int, filtered: bool) -> Detector:
 
 
 def _kaze(kind: str) -> list[Detector]:
-    more = {"runs": "opencv", "convention": OPENCV, "kappa": None, "assumed_blur": None}
+    more: dict[str, Any] = {"convention": OPENCV, "kappa": None, "assumed_blur": None}
     return [
-        _library(kind.lower(), label, options={"kind": kind, **filters}, **more)
+        _library(kind.lower(), label, "opencv", options={"kind": kind, **filters}, **more)
         for label, filters in (("no filters", {"threshold": 1e-5}), ("as shipped", {}))
     ]
 
@@ -183,7 +183,8 @@ def own_detector(text: str, convention: Convention = KEYSTAB) -> Detector:
             words = shlex.split(text)
         except ValueError as error:
             raise InputError(f"the command {text!r} cannot be read: {error}") from None
-        named = Detector(words[0], "as given", "command", text, convention)
+        name = " ".join(word for word in words if "{" not in word) or "command"
+        named = Detector(name, "as given", "command", text, convention)
         return replace(named, kappa=None, assumed_blur=None)
     known = ", ".join(dict.fromkeys(each.name for each in DETECTORS))
     raise InputError(

@@ -49,7 +49,8 @@ class Limits:
     seconds : float
         For one picture.
     start : float
-        More seconds for the first one: libraries are loaded, code is compiled.
+        Until the detector is there, and more seconds for the first picture of a library's, which
+        may compile its code.
     output : int
         Bytes that it may print, for all pictures together.
     """
@@ -130,7 +131,8 @@ def detections(
         assert process.stdout is not None
         said = _Said(process.stdout, limits.output)
         try:
-            yield from _answers(process, said, folder, images, limits)
+            more = limits.start if detector.kind == "library" else 0.0
+            yield from _answers(process, said, folder, images, limits, more)
         finally:
             _end(process)
             said.thread.join(timeout=1.0)
@@ -147,7 +149,7 @@ class _Said:
 
     def _read(self) -> None:
         with self._stream:
-            while self.count <= self.most and (data := self._stream.read1(4096)):  # type: ignore[attr-defined]
+            while data := self._stream.read1(4096):  # type: ignore[attr-defined]
                 self.count += len(data)
                 self.end = (self.end + data)[-2000:]
 
@@ -166,14 +168,18 @@ def _answers(
     folder: Path,
     images: Sequence[NDArray[np.float64]],
     limits: Limits,
+    more: float,
 ) -> Iterator[Found]:
-    version = ""
-    since, allowed = time.monotonic(), limits.start + limits.seconds
+    version, started = "", folder / "started.json"
+    since, allowed = time.monotonic(), limits.start
     for number, image in enumerate(images):
         found, failed = folder / f"found_{number:03d}.npz", folder / f"failed_{number:03d}.json"
         problem = ""
-        while not (found.exists() or failed.exists()):
+        while said.too_much or not (found.exists() or failed.exists()):
             over = process.poll() is not None
+            if number == 0 and not version and started.exists():
+                version = one_line(str(_read_json(started).get("version", ""))) or " "
+                since, allowed = time.monotonic(), limits.seconds + more
             if said.too_much:
                 problem = f"it printed more than {limits.output} bytes"
             elif over and not (found.exists() or failed.exists()):
@@ -183,18 +189,19 @@ def _answers(
                 problem = f"it took more than {allowed:g} s for a picture"
             if problem:
                 for _ in range(number, len(images)):
-                    yield Found(None, math.nan, problem, version, ended=True)
+                    yield Found(None, math.nan, problem, version.strip(), ended=True)
                 return
             time.sleep(_POLL)
-        if number == 0:
-            version = one_line(str(_read_json(folder / "started.json").get("version", "")))
+        version = version or one_line(str(_read_json(started).get("version", "")))
         since, allowed = time.monotonic(), limits.seconds
         if failed.exists():
-            problem = one_line(str(_read_json(failed).get("problem", "it failed")))
-            yield Found(None, math.nan, problem, version)
+            problem = str(_read_json(failed).get("problem", "it failed"))
+            if problem.startswith("it ended with status") and said.last_line():
+                problem += f": {said.last_line()}"
+            yield Found(None, math.nan, one_line(problem), version.strip())
         else:
             keypoints, seconds, problem = _checked(found, image.shape)
-            yield Found(keypoints, seconds, problem, version)
+            yield Found(keypoints, seconds, problem, version.strip())
 
 
 def _how_it_ended(status: int, last: str) -> str:
@@ -245,7 +252,7 @@ def _checked(path: Path, shape: tuple[int, ...]) -> tuple[pd.DataFrame | None, f
         return None, seconds, "its columns have different lengths"
     (n,) = sizes
     if n > most:
-        return None, seconds, f"{n} keypoints in a picture of {most} pixels; one per pixel at most"
+        return None, seconds, f"{n} keypoints, more than the picture has pixels"
     wrong = ~np.isfinite(np.stack(needed)).all(axis=0)
     if wrong.any():
         return None, seconds, f"{int(wrong.sum())} of {n} keypoints are at NaN or infinity"

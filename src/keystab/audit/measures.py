@@ -164,7 +164,7 @@ def _pairs(seen: Sequence[_Seen]) -> _Pairs:
         position = true[["y", "x"]].to_numpy(dtype=float)
         sigma = true["sigma"].to_numpy(dtype=float)
         parts.append(
-            (
+            _Pairs(
                 found[["y", "x"]].to_numpy(dtype=float) - position,
                 position,
                 sigma,
@@ -173,10 +173,13 @@ def _pairs(seen: Sequence[_Seen]) -> _Pairs:
                 found,
             )
         )
-    error, position, sigma, scale, view, found = zip(*parts, strict=True)
     return _Pairs(
-        *(np.concatenate(each) for each in (error, position, sigma, scale, view)),
-        pd.concat(found, ignore_index=True),
+        np.concatenate([part.error for part in parts]),
+        np.concatenate([part.position for part in parts]),
+        np.concatenate([part.sigma for part in parts]),
+        np.concatenate([part.scale for part in parts]),
+        np.concatenate([part.view for part in parts]),
+        pd.concat([part.found for part in parts], ignore_index=True),
     )
 
 
@@ -237,8 +240,8 @@ def _places(pairs: _Pairs, shape: tuple[int, ...]) -> dict[str, Any]:
     drifts = drift(pairs.error, pairs.position, (float(shape[0]), float(shape[1])))
     held = NOTHING
     if {"std_y", "std_x"} <= {*pairs.found} and len(pairs.found):
-        bars = (pairs.found[name].to_numpy(dtype=float) for name in ("std_y", "std_x"))
-        held = coverage(pairs.error, *bars, pairs.found.get("cov_yx", 0.0))
+        std_y, std_x = (pairs.found[name].to_numpy(dtype=float) for name in ("std_y", "std_x"))
+        held = coverage(pairs.error, std_y, std_x, pairs.found.get("cov_yx", 0.0))
     return {
         **quantile(pairs.error[:, 0]).named("bias_y"),
         **quantile(pairs.error[:, 1]).named("bias_x"),
@@ -260,13 +263,13 @@ def _repeatabilities(condition: Condition, seen: Sequence[_Seen]) -> dict[str, A
     matched, numbers = none, [0]
     stage = condition.stage
     for other in seen[1:] if stage is not None else ():
-        frames = _in_first_frame(condition, seen[0], other)
+        first, second = _in_first_frame(condition, seen[0], other)
         area = _common_area(condition, seen[0], other)
         number = int(area / PER_KEYPOINT)
         numbers.append(number)
         for distance in DISTANCES:
-            counts[distance] += in_common(*frames, distance)
-        matched += in_common(*frames, 1.0, number=number)
+            counts[distance] += in_common(first, second, distance)
+        matched += in_common(first, second, 1.0, number=number)
     row: dict[str, Any] = {}
     for distance, count in counts.items():
         row |= count.repeatability.named(f"repeatability_{distance:g}")

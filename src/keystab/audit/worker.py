@@ -28,6 +28,7 @@ import sys
 import time
 import zlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def opencv(image: Any, camera_blur: float, kind: str = "SIFT", **options: Any) -
     import cv2
 
     cv2.setNumThreads(1)
-    room: Any = cv2 if hasattr(cv2, f"{kind}_create") else cv2.xfeatures2d
+    room: Any = cv2 if hasattr(cv2, f"{kind}_create") else vars(cv2)["xfeatures2d"]
     found = getattr(room, f"{kind}_create")(**options).detect(eight_bits(image), None)
     return of_opencv(found)
 
@@ -195,6 +196,8 @@ def columns_of(found: Any, order: str) -> Columns:
     """Columns of whatever a function returned: a table, rows of numbers, or of cv2.KeyPoint."""
     if found is None:
         raise TypeError("it returned None; return a table with y, x and sigma")
+    if isinstance(found, (str, bytes)):
+        raise TypeError("it returned text; return a table with y, x and sigma")
     if hasattr(found, "keys"):
         names = {str(name): name for name in found.keys()}  # noqa: SIM118 (a table iterates too)
         missing = [name for name in ("y", "x") if name not in names]
@@ -217,9 +220,9 @@ def columns_of_file(path: Path) -> Columns:
     """Columns of a table that a command wrote: text, names in the first line."""
     if not path.is_file():
         raise FileNotFoundError("it wrote no table")
-    if path.stat().st_size > MOST_WRITTEN:
+    if path.stat().st_size >= MOST_WRITTEN:
         raise ValueError(f"it wrote a table of more than {MOST_WRITTEN} bytes")
-    with path.open(encoding="utf-8", newline="") as file:
+    with path.open(encoding="utf-8", errors="replace", newline="") as file:
         rows = csv.reader(file)
         names = [name.strip() for name in next(rows, [])]
         wanted = [name for name in (*KNOWN, "sigma") if name in names]
@@ -295,7 +298,7 @@ def confine() -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def write(path: Path, data: Callable[[Path], None]) -> None:
+def write(path: Path, data: Callable[[Path], object]) -> None:
     """Write a file that appears whole."""
     part = path.with_name(f"part-{path.name}")
     data(part)
@@ -310,7 +313,7 @@ def main(folder: Path) -> int:
         detect, version = detector_of(job, folder)
     except BaseException as error:
         detect, version = refusing(error), ""
-    write(folder / "started.json", lambda path: path.write_text(json.dumps({"version": version})))
+    write(folder / "started.json", partial(note, {"version": version}))
     for number, blur in enumerate(job["blurs"]):
         image = np.load(folder / f"view_{number:03d}.npy")
         start = time.perf_counter()
@@ -320,10 +323,13 @@ def main(folder: Path) -> int:
             arrays = {name: np.asarray(columns[name]) for name in KNOWN if name in columns}
             numbers = {name: each.astype(np.float64) for name, each in arrays.items()}
             numbers["seconds"] = np.array(seconds)
-            write(folder / f"found_{number:03d}.npz", lambda path, n=numbers: save(path, n))
+            write(folder / f"found_{number:03d}.npz", partial(save, numbers))
         except Exception as error:
-            said = json.dumps({"problem": in_one_line(error)})
-            write(folder / f"failed_{number:03d}.json", lambda path, s=said: path.write_text(s))
+            problem = in_one_line(error)
+            if job["kind"] == "function" and not isinstance(error, RuntimeError):
+                problem += f" (the image is grey, of shape {image.shape})"
+            said = partial(note, {"problem": problem})
+            write(folder / f"failed_{number:03d}.json", said)
     return 0
 
 
@@ -336,7 +342,12 @@ def refusing(error: BaseException) -> Callable[..., Columns]:
     return detect
 
 
-def save(path: Path, arrays: dict[str, Any]) -> None:
+def note(about: dict[str, str], path: Path) -> None:
+    """Write a few words."""
+    path.write_text(json.dumps(about), encoding="utf-8")
+
+
+def save(arrays: dict[str, Any], path: Path) -> None:
     """Write arrays under a name that need not end in .npz."""
     with path.open("wb") as file:
         np.savez(file, **arrays)
