@@ -98,13 +98,13 @@ def _convention(text: str | None) -> Convention:
     if len(words) != 3:
         raise InputError(f"--convention {text}: give origin, order and scale, such as 0.5,xy,sigma")
     try:
-        scale = words[2] if words[2] in SCALES else float(words[2])
-        return Convention(float(words[0]), words[1], scale)
+        origin, scale = float(words[0]), words[2] if words[2] in SCALES else float(words[2])
     except ValueError:
         raise InputError(
             f"--convention {text}: give numbers of pixels and one of {', '.join(SCALES)}, such as "
             "0.5,xy,sigma"
         ) from None
+    return Convention(origin, words[1], scale)
 
 
 def _say(start: float, text: str) -> None:
