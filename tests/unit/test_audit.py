@@ -13,18 +13,20 @@ import pytest
 
 from keystab.audit.conditions import (
     BLUR,
+    CONDITIONS,
     HIGH,
     KAPPA,
     LOW,
+    PLAN,
     SPAN,
     STEP,
-    Plan,
     Stage,
     blobs,
-    conditions,
+    condition_of,
     made_picture,
     spread_points,
     stage_of,
+    views_of,
 )
 from keystab.audit.controls import CONTROLS
 from keystab.audit.detectors import DETECTORS, FINE, Detector, chosen, own_detector
@@ -35,18 +37,18 @@ from keystab.audit.run import (
     COLUMNS,
     Audit,
     audited,
-    condition_of,
     joined,
-    names_of_conditions,
+    with_conventions,
 )
 from keystab.camera.simulation import Scene
 from keystab.cli.main import main
 from keystab.errors import InputError
 from keystab.io.keypoint_conventions import KEYSTAB, Convention
 from keystab.io.tables import read_table
+from keystab.parameters import AuditPlan
 
 ROOT = Path(__file__).parents[2]
-SMALL = Plan(width=80, n_views=2, blobs=10)
+SMALL = AuditPlan(width=80, n_views=2, blobs=10)
 BLOBS = blobs(SMALL)
 
 
@@ -79,8 +81,9 @@ def stage() -> Stage:
 
 @pytest.fixture(scope="module")
 def controls(stage):
-    audit = Audit([condition_of(name, SMALL, stage) for name in names_of_conditions(SMALL)])
-    return audit.controls()
+    audit = Audit([condition_of(name, SMALL, stage) for name in CONDITIONS])
+    tables = audit.controls()
+    return tables._replace(audit=with_conventions(tables.audit))
 
 
 def rows(tables, setting, condition=None):
@@ -104,7 +107,7 @@ def test_there_are_a_hundred_blobs_of_each_size_of_all_phases():
 
 
 def test_views_of_all_conditions_see_the_same_scene(stage):
-    for name in names_of_conditions(SMALL)[1:]:
+    for name in CONDITIONS[1:]:
         condition = condition_of(name, SMALL, stage)
         assert len(condition.views) >= 2, name
         for view in condition.views:
@@ -116,7 +119,7 @@ def test_views_of_all_conditions_see_the_same_scene(stage):
 
 
 def test_conditions_are_those_that_are_promised():
-    found = conditions(Plan())
+    found = {name: views_of(name, PLAN) for name in CONDITIONS[1:]}
     assert {f"blur {blur}" for blur in (0.3, 0.5, 0.8, 1.1)} <= found.keys()
     assert {"translations", "rotation 90", "noise 0.03"} < found.keys()
     for name, specs in found.items():
@@ -127,9 +130,28 @@ def test_conditions_are_those_that_are_promised():
     assert max(len(specs) for specs in found.values()) == len(found["translations"]) == 8
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        "blur",
+        "blur -1",
+        "zoom 0.5",
+        "zoom 9",
+        "noise x",
+        "rotation nan",
+        "translations 3",
+        "shear 2",
+    ],
+)
+def test_unknown_conditions_are_refused(name):
+    with pytest.raises(InputError, match="give blobs, translations, blur 0 to 1.4"):
+        views_of(name, PLAN)
+
+
 def test_a_picture_that_is_too_small_is_refused_before_it_is_searched():
     with pytest.raises(InputError, match="at least 368 x 368"):
-        stage_of(np.zeros((300, 900)), Plan())
+        stage_of(np.zeros((300, 900)), PLAN)
 
 
 def test_the_made_picture_is_the_same_everywhere():
@@ -185,7 +207,7 @@ def test_every_number_has_a_column_and_every_column_a_number(controls):
     for name in COLUMNS:
         if not name.startswith(measured_by_libraries):
             assert controls.audit[name].notna().any(), name
-    assert len(controls.audit) == len(CONTROLS) * len(names_of_conditions(SMALL))
+    assert len(controls.audit) == len(CONTROLS) * len(CONDITIONS)
     assert set(controls.octaves["sigma_low"]) == {LOW, 2 * LOW}
 
 

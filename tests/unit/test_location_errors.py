@@ -109,7 +109,9 @@ def test_ellipses_hold_what_their_covariance_says():
     bars = np.sqrt(np.diag(covariance))
     found = coverage(errors, bars[0] * ones, bars[1] * ones, covariance[0, 1] * ones)
     assert found.low <= 0.9 <= found.high
-    assert coverage(errors, bars[0] * ones, bars[1] * ones).high < 0.89  # another shape, and it tells
+    assert (
+        coverage(errors, bars[0] * ones, bars[1] * ones).high < 0.89
+    )  # another shape, and it tells
     assert coverage(errors, bars[0] * ones / 3, bars[1] * ones / 3).value < 0.5
     assert coverage(errors[:2], [np.nan, 1.0], [1.0, 0.0]).value == 0.0
 

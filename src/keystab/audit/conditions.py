@@ -12,7 +12,6 @@ times farther on both sides, so that nothing at the ends is without a partner.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -24,20 +23,22 @@ from numpy.typing import NDArray
 from keystab.camera.simulation import Scene, simulate, simulate_view
 from keystab.camera.views import ViewSpec, to_reference, to_view
 from keystab.errors import InputError
+from keystab.parameters import AuditPlan
 from keystab.truth.scene_extrema import scene_extrema
 
 __all__ = [
     "BLOBS",
-    "Condition",
-    "Plan",
+    "CONDITIONS",
+    "PLAN",
     "QUICK",
+    "Condition",
     "Stage",
     "View",
     "blobs",
-    "conditions",
+    "condition_of",
     "made_picture",
     "stage_of",
-    "taken",
+    "views_of",
 ]
 
 KAPPA = 2 ** (1 / 3)
@@ -60,33 +61,21 @@ STEP = 4.0
 SPAN = 1.7
 """How many times a view the scene is, so that views can turn and zoom in it."""
 
-BLOBS = "blobs"
 _SIZES, _APART = (1.6, 2.8, 5.0), 7.0
 _GREY, _HEIGHT = 0.2, 0.6
 _RADII = (3.0, 200.0)
 _GOLDEN = 1.32471795724474602596  # the plastic number: its powers spread points evenly
 
 
-@dataclass(frozen=True)
-class Plan:
-    """How much is asked.
+BLOBS = "blobs"
+PLAN, QUICK = AuditPlan(288, 4, 11), AuditPlan(192, 2, 10)
+"""How much is asked, and how much in a hurry."""
 
-    Parameters
-    ----------
-    width : int
-        Width of a view in pixels; a scene that is smaller gives smaller ones.
-    n_views : int
-        Views of most conditions; translations have twice as many.
-    blobs : int
-        Blobs of each size, along each side.
-    """
-
-    width: int = 288
-    n_views: int = 4
-    blobs: int = 11
-
-
-QUICK = Plan(width=192, n_views=2, blobs=10)
+CONDITIONS = (
+    BLOBS, "translations", "blur 0.3", "blur 0.5", "blur 0.8", "blur 1.1", "zoom 1.25", "zoom 1.6",
+    "rotation 90", "rotation 30", "noise 0.01", "noise 0.03",
+)  # fmt: skip
+"""All conditions; the numbers are pixels, a ratio, degrees, and grey values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,16 +190,23 @@ class Stage:
         return View(simulate(self.scene, spec), spec.blur, truth, wanted, spec)
 
 
-def stage_of(picture: NDArray[np.float64], plan: Plan, threads: int = 1) -> Stage:
+def stage_of(
+    picture: NDArray[np.float64],
+    plan: AuditPlan,
+    threads: int = 1,
+    truth: pd.DataFrame | None = None,
+) -> Stage:
     """Make a scene of a picture: as many of its pixels as views need, and their true extrema.
 
     Parameters
     ----------
     picture : ndarray, shape (height, width)
         Grey values. A large one is seen from farther away first.
-    plan : Plan
+    plan : AuditPlan
     threads : int
         Threads of the search for extrema.
+    truth : DataFrame, optional
+        Its true extrema, where they are known from before.
 
     Returns
     -------
@@ -233,6 +229,8 @@ def stage_of(picture: NDArray[np.float64], plan: Plan, threads: int = 1) -> Stag
             f"the picture has {picture.shape[0]} x {picture.shape[1]} pixels; give one of at "
             f"least {needed} x {needed}"
         )
+    if truth is not None:
+        return Stage(scene, truth, (height, width))
     parts = []
     for octave in range(3):
         step = STEP * 2**octave
@@ -281,52 +279,96 @@ def made_picture(height: int = 800, width: int = 1360) -> NDArray[np.float64]:
     return picture
 
 
-def conditions(plan: Plan) -> dict[str, list[ViewSpec]]:
-    """Views of all conditions of a scene, by name; shapes are filled in by `taken`.
+def views_of(condition: str, plan: AuditPlan) -> list[ViewSpec]:
+    """Views of a condition of a scene; their shapes are those of the scene.
+
+    Parameters
+    ----------
+    condition : str
+        ``translations``, or one of ``blur C``, ``zoom Z``, ``rotation DEGREES`` and ``noise SD``
+        with a number; see `CONDITIONS`.
+    plan : AuditPlan
+
+    Returns
+    -------
+    list of ViewSpec
+        All views are moved by other fractions of a pixel, and by up to two pixels, so that samples
+        of coarser octaves are met at all phases too. The first looks straight at the scene from
+        nearby; zooms step back in every second view, rotations turn by the angle from view to view.
+
+    Raises
+    ------
+    InputError
+        If there is no such condition.
 
     Examples
     --------
-    >>> [len(specs) for specs in conditions(Plan()).values()][:3]
-    [8, 4, 4]
+    >>> [spec.step for spec in views_of("zoom 1.5", PLAN)]
+    [4.0, 6.0, 4.0, 6.0]
     """
-    n = plan.n_views
-
-    def views(count: int, blur: float = BLUR) -> list[ViewSpec]:
-        shifts = 4 * (spread_points(count) - 0.5)  # all phases of samples up to four pixels apart
-        return [ViewSpec(blur, STEP, (1, 1), (float(y), float(x))) for y, x in shifts]
-
-    found = {"translations": views(2 * n)}
-    found |= {f"blur {blur}": views(n, blur=blur) for blur in (0.3, 0.5, 0.8, 1.1)}
-    found |= {
-        f"zoom {zoom}": [
-            replace(spec, step=STEP * zoom ** (number % 2)) for number, spec in enumerate(views(n))
-        ]
-        for zoom in (1.25, 1.6)
-    }
-    found |= {
-        f"rotation {degrees}": [
-            replace(spec, rotation=math.radians(degrees) * number)
-            for number, spec in enumerate(views(min(n, most)))
-        ]
-        for degrees, most in ((90, 4), (30, 2))
-    }
-    found |= {
-        f"noise {noise}": [
-            replace(spec, noise=noise, seed=("audit", number))
-            for number, spec in enumerate(views(n))
-        ]
-        for noise in (0.01, 0.03)
-    }
-    return found
-
-
-def taken(name: str, specs: Sequence[ViewSpec], stage: Stage) -> Condition:
-    """Take the views of a condition."""
-    whole = [replace(spec, shape=stage.shape) for spec in specs]
-    return Condition(name, [stage.view(spec) for spec in whole], stage)
+    kind, _, text = condition.partition(" ")
+    try:
+        value = float(text) if text else 0.0
+        if (kind == "translations") is bool(text) or not math.isfinite(value):
+            raise ValueError
+        if kind not in ("translations", *_LIMITS) or not _within(kind, value):
+            raise ValueError
+    except ValueError:
+        raise InputError(
+            f"condition {condition!r}: give {BLOBS}, translations, blur 0 to {LOW}, zoom 1 to "
+            f"{SPAN}, rotation or noise with a number"
+        ) from None
+    count = {"translations": 2 * plan.n_views, "rotation": min(plan.n_views, 4)}.get(
+        kind, plan.n_views
+    )
+    if kind == "rotation" and value % 90:
+        count = min(count, 2)  # views at other angles take long
+    specs = []
+    for number, (y, x) in enumerate(4 * (spread_points(count) - 0.5)):
+        spec = ViewSpec(BLUR, STEP, (1, 1), (float(y), float(x)))
+        specs.append(
+            {
+                "translations": spec,
+                "blur": replace(spec, blur=value),
+                "zoom": replace(spec, step=STEP * value ** (number % 2) if value else STEP),
+                "rotation": replace(spec, rotation=math.radians(value) * number),
+                "noise": replace(spec, noise=abs(value), seed=("audit", number)),
+            }[kind]
+        )
+    return specs
 
 
-def blobs(plan: Plan) -> Condition:
+_LIMITS = {"blur": (0.0, LOW), "zoom": (1.0, SPAN), "rotation": (-360.0, 360.0), "noise": (0, 1)}
+
+
+def _within(kind: str, value: float) -> bool:
+    low, high = _LIMITS.get(kind, (0.0, 0.0))
+    return low <= value <= high
+
+
+def condition_of(name: str, plan: AuditPlan, stage: Stage | None) -> Condition:
+    """Take the views of a condition; blobs need no scene.
+
+    Parameters
+    ----------
+    name : str
+        One of `CONDITIONS`, or another that `views_of` knows.
+    plan : AuditPlan
+    stage : Stage or None
+
+    Raises
+    ------
+    InputError
+        As `views_of`.
+    """
+    if name == BLOBS:
+        return blobs(plan)
+    assert stage is not None, "only blobs need no scene"
+    specs = [replace(spec, shape=stage.shape) for spec in views_of(name, plan)]
+    return Condition(name, [stage.view(spec) for spec in specs], stage)
+
+
+def blobs(plan: AuditPlan) -> Condition:
     """Pictures of isolated blobs, one for each of three sizes, an octave apart or nearly.
 
     Each blob's neighbours are seven of its standard deviations away, and change where it is by less

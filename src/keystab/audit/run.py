@@ -15,12 +15,7 @@ from keystab.audit.conditions import (
     KNOWN,
     LOW,
     Condition,
-    Plan,
-    Stage,
     View,
-    blobs,
-    conditions,
-    taken,
 )
 from keystab.audit.controls import CONTROLS
 from keystab.audit.detectors import Detector
@@ -30,7 +25,7 @@ from keystab.evaluation.convention_found import found_convention
 from keystab.io.keypoint_conventions import KEYSTAB
 from keystab.truth.true_extrema import true_extrema
 
-__all__ = ["CONTROL", "Audit", "Tables", "audited", "condition_of", "names_of_conditions"]
+__all__ = ["CONTROL", "Audit", "Tables", "audited", "joined", "with_conventions"]
 
 CONTROL = "control"
 """Name of the controls in the column of detectors."""
@@ -73,6 +68,9 @@ _ENDS = ("", "_low", "_high")
 COLUMNS = (*_FIRST, *(f"{name}{end}" for name in _ESTIMATES for end in _ENDS), *_LAST)
 """Columns of `Tables.audit`."""
 
+_OWN = ("translations", "blur", "noise")
+"""Conditions in which detectors are held against their own definition."""
+
 _WHO = ("detector", "setting", "condition")
 _OCTAVES = (
     *_WHO, "sigma_low", "sigma_high", "n",
@@ -114,30 +112,19 @@ class Audit:
     ) -> Tables:
         """Audit one detector under all conditions."""
         found = _by_condition(detector, self.conditions, limits, python)
-        convention = ""
         tables = []
         problems: dict[str, list[str]] = {}
         for condition, answers in zip(self.conditions, found, strict=True):
+            columns = [each.keypoints for each in answers if each.keypoints is not None]
             problem = next((each.problem for each in answers if each.keypoints is None), "")
-            empty = not problem and all(not len(_some(each)) for each in answers)
-            problem = problem or ("it found nothing" if empty else "")
+            if not problem and not any(map(len, columns)):
+                problem = "it found nothing"
+            done = unmeasured()
+            if len(columns) == len(answers):
+                done = measured(condition, columns, detector.convention)
+                done.row.update(self._own_definition(detector, condition, columns))
             if problem:
                 problems.setdefault(problem, []).append(condition.name)
-            done = unmeasured()
-            if all(each.keypoints is not None for each in answers):
-                columns = [_some(each) for each in answers]
-                if condition.name == BLOBS:
-                    truths = [view.truth for view in condition.views]
-                    order = detector.convention.order
-                    convention = str(found_convention(columns, truths, order))
-                done = measured(condition, columns, detector.convention)
-                if condition.name != BLOBS and detector.kappa is not None:
-                    own = self.own_truth(
-                        condition, detector.kappa, detector.own_blur(condition.views[0].blur)
-                    )
-                    done.row.update(
-                        own_definition(condition.views[0], columns[0], detector.convention, own)
-                    )
             head = {
                 "detector": detector.name,
                 "setting": detector.setting,
@@ -145,29 +132,23 @@ class Audit:
                 "version": answers[0].version,
                 "problem": problem,
                 "convention_declared": str(detector.convention),
+                "convention_found": _convention(condition, columns, detector.convention.order),
             }
             tables.append(_tables(head, done, [each.seconds for each in answers]))
         for problem, names in problems.items():
             where = "" if len(names) == len(self.conditions) else f" ({', '.join(names)})"
             told(f"{detector.name}, {detector.setting}: {problem}{where}")
-        whole = joined(tables)
-        whole.audit["convention_found"] = convention
-        return whole
+        return joined(tables)
 
     def controls(self) -> Tables:
         """Audit what is known to be right, wrong in known ways, and chance."""
         tables = []
         for setting, control in CONTROLS.items():
-            convention = ""
-            own = []
             for condition in self.conditions:
                 columns = [
                     control(view, number).rename(columns={"sigma": "scale"})
                     for number, view in enumerate(condition.views)
                 ]
-                if condition.name == BLOBS:
-                    truths = [view.truth for view in condition.views]
-                    convention = str(found_convention(columns, truths))
                 head = {
                     "detector": CONTROL,
                     "setting": setting,
@@ -175,30 +156,45 @@ class Audit:
                     "version": "",
                     "problem": "",
                     "convention_declared": str(KEYSTAB),
+                    "convention_found": _convention(condition, columns, KEYSTAB.order),
                 }
-                own.append(_tables(head, measured(condition, columns, KEYSTAB), []))
-            whole = joined(own)
-            whole.audit["convention_found"] = convention
-            tables.append(whole)
+                tables.append(_tables(head, measured(condition, columns, KEYSTAB), []))
         return joined(tables)
 
+    def _own_definition(
+        self, detector: Detector, condition: Condition, columns: Sequence[pd.DataFrame]
+    ) -> dict[str, float]:
+        """Recall and precision by the detector's own definition, where it is known."""
+        view = condition.views[0]
+        if detector.kappa is None or condition.name.split()[0] not in _OWN:
+            return {}
+        truth = self.own_truth(condition, detector.kappa, detector.own_blur(view.blur))
+        return own_definition(view, columns[0], detector.convention, truth)
 
-def names_of_conditions(plan: Plan) -> list[str]:
-    """Names of all conditions, that of the blobs first.
 
-    Examples
-    --------
-    >>> names_of_conditions(Plan())[:3]
-    ['blobs', 'translations', 'blur 0.3']
+def with_conventions(table: pd.DataFrame) -> pd.DataFrame:
+    """Table of an audit in which what was found on blobs stands in all rows of a setting.
+
+    Parameters
+    ----------
+    table : DataFrame
+        `Tables.audit`, with ``convention_found`` in the rows of blobs.
+
+    Returns
+    -------
+    DataFrame
     """
-    return [BLOBS, *conditions(plan)]
+    on_blobs = table[table["condition"] == BLOBS].set_index(["detector", "setting"])
+    found = on_blobs["convention_found"].to_dict()
+    keys = zip(table["detector"], table["setting"], strict=True)
+    return table.assign(convention_found=[found.get(key, "") for key in keys])
 
 
-def condition_of(name: str, plan: Plan, stage: Stage | None) -> Condition:
-    """Take the views of a condition; only blobs need no scene."""
-    if name == BLOBS or stage is None:
-        return blobs(plan)
-    return taken(name, conditions(plan)[name], stage)
+def _convention(condition: Condition, columns: Sequence[pd.DataFrame], order: str) -> str:
+    """What positions and scales seem to mean, where that can be told: on blobs."""
+    if condition.name != BLOBS or len(columns) < len(condition.views):
+        return ""
+    return str(found_convention(columns, [view.truth for view in condition.views], order))
 
 
 def audited(
@@ -223,6 +219,7 @@ def audited(
     Yields
     ------
     Tables
+        What is found of conventions stands in the rows of blobs; see `with_conventions`.
     """
     yield audit.controls()
     for detector in detectors:
@@ -272,11 +269,6 @@ def _by_condition(
 def _may_go_on(batch: Sequence[Found]) -> bool:
     problem = next(each.problem for each in batch if each.ended)
     return problem.startswith("it was ended") or problem.startswith("it ended")
-
-
-def _some(found: Found) -> pd.DataFrame:
-    assert found.keypoints is not None
-    return found.keypoints
 
 
 def _tables(head: dict[str, Any], done: Measured, seconds: Sequence[float]) -> Tables:

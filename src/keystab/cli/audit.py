@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 from keystab.errors import InputError
 
 if TYPE_CHECKING:
-    from keystab.audit.conditions import Plan, Stage
+    from keystab.audit.conditions import Stage
     from keystab.io.keypoint_conventions import Convention
+    from keystab.parameters import AuditPlan
 
 TABLES = ("audit.csv", "audit_octaves.csv", "audit_phases.csv", "durations.csv")
 """Tables in the folder that an audit writes."""
@@ -21,11 +22,11 @@ TABLES = ("audit.csv", "audit_octaves.csv", "audit_phases.csv", "durations.csv")
 
 def audit(args: argparse.Namespace) -> None:
     """Audit detectors, and write tables, a figure and a page."""
-    from keystab.audit.conditions import QUICK, Plan
+    from keystab.audit.conditions import CONDITIONS, PLAN, QUICK, condition_of
     from keystab.audit.detectors import chosen
     from keystab.audit.isolation import Limits
     from keystab.audit.page import page
-    from keystab.audit.run import Audit, audited, condition_of, joined, names_of_conditions
+    from keystab.audit.run import Audit, audited, joined, with_conventions
     from keystab.figures import audit as figure
     from keystab.figures._render import save
     from keystab.io.tables import write_table
@@ -38,12 +39,10 @@ def audit(args: argparse.Namespace) -> None:
     if shutil.which(python) is None:
         raise InputError(f"--python {python}: no such program; give the path of a Python")
     detectors = chosen(args.detectors, _convention(args.convention))
-    plan = QUICK if args.quick else Plan()
+    plan = QUICK if args.quick else PLAN
     stage, scene = _scene(args, plan)
     _say(start, f"{len(detectors)} settings of detectors, {scene}")
-    conditions = []
-    for name in names_of_conditions(plan):
-        conditions.append(condition_of(name, plan, stage))
+    conditions = [condition_of(name, plan, stage) for name in CONDITIONS]
     views = sum(len(condition.views) for condition in conditions)
     _say(start, f"{len(conditions)} conditions, {views} pictures")
     limits = Limits(args.time_limit)
@@ -63,6 +62,7 @@ def audit(args: argparse.Namespace) -> None:
             _say(start, f"{named} ({len(found)} of {len(detectors) + 1})")
         problems.clear()
     whole = joined(found)
+    whole = whole._replace(audit=with_conventions(whole.audit))
     args.output.mkdir(parents=True, exist_ok=True)
     for name, table in zip(TABLES, whole, strict=True):
         write_table(table, args.output / name)
@@ -75,7 +75,7 @@ def audit(args: argparse.Namespace) -> None:
     _say(start, f"{args.output / 'audit.md'} says what was found, audit.csv has all numbers")
 
 
-def _scene(args: argparse.Namespace, plan: Plan) -> tuple[Stage, str]:
+def _scene(args: argparse.Namespace, plan: AuditPlan) -> tuple[Stage, str]:
     """The scene that views show, and what to call it."""
     from keystab.audit.conditions import made_picture, stage_of
     from keystab.io.pictures import read_picture
