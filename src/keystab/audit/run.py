@@ -203,8 +203,9 @@ def audited(
     limits: Limits | None = None,
     python: str = sys.executable,
     told: Callable[[str], None] = lambda line: None,
+    controls: bool = True,
 ) -> Iterator[Tables]:
-    """Audit detectors one after the other; the controls come first.
+    """Audit detectors one after the other.
 
     Parameters
     ----------
@@ -215,13 +216,16 @@ def audited(
         The Python that runs detectors of other libraries than this.
     told : callable
         Takes one line for each problem.
+    controls : bool
+        Whether the controls come first.
 
     Yields
     ------
     Tables
         What is found of conventions stands in the rows of blobs; see `with_conventions`.
     """
-    yield audit.controls()
+    if controls:
+        yield audit.controls()
     for detector in detectors:
         runs_here = detector.kind == "library" and detector.runs == "keystab"
         yield audit.rows(detector, limits, sys.executable if runs_here else python, told)
