@@ -24,8 +24,8 @@ from keystab.audit.conditions import (
     blobs,
     condition_of,
     made_picture,
+    scene_of,
     spread_points,
-    stage_of,
     views_of,
 )
 from keystab.audit.controls import CONTROLS
@@ -151,7 +151,13 @@ def test_unknown_conditions_are_refused(name):
 
 def test_a_picture_that_is_too_small_is_refused_before_it_is_searched():
     with pytest.raises(InputError, match="at least 368 x 368"):
-        stage_of(np.zeros((300, 900)), PLAN)
+        scene_of(np.zeros((300, 900)), PLAN)
+    with pytest.raises(InputError, match="at least 752 x 752"):
+        scene_of(np.zeros((700, 4000)), PLAN)
+    small, large = np.zeros((800, 1200)), np.zeros((1300, 2000))
+    assert scene_of(small, PLAN) is small
+    assert scene_of(large, PLAN).shape == (1272, 1958)
+    assert scene_of(scene_of(large, PLAN), PLAN).shape == (1272, 1958)  # once is enough
 
 
 def test_the_made_picture_is_the_same_everywhere():

@@ -22,7 +22,8 @@ rule find_audit_truth:
     input:
         reference=local(of(plan.setting, "reference")),
     output:
-        table=f"{HERE}audit/truth.parquet",
+        scene=f"{HERE}audit/scene.npy",
+        truth=f"{HERE}audit/truth.parquet",
     log:
         f"{LOG}audit/truth.log",
     benchmark:
@@ -40,7 +41,7 @@ rule find_audit_truth:
 rule audit_detector:
     """Figure audit: one detector, with all its settings, in one condition."""
     input:
-        reference=local(of(plan.setting, "reference")),
+        scene=f"{HERE}audit/scene.npy",
         truth=f"{HERE}audit/truth.parquet",
     output:
         audit=f"{HERE}audit/{{detector}}/{{condition}}.csv",
@@ -50,8 +51,6 @@ rule audit_detector:
         f"{LOG}audit/{{detector}}/{{condition}}.log",
     benchmark:
         f"{BENCHMARK}audit/{{detector}}/{{condition}}.tsv"
-    resources:
-        mem_mb=growing(job_resources.megabytes_of_reference),
     params:
         **stage(
             "audit_detector",
@@ -60,7 +59,8 @@ rule audit_detector:
             condition="{condition}",
             durations=f"{LOG}audit/{{detector}}/{{condition}}_durations.csv",
         ),
-        # What runs in the processes is not imported by the stage.
+        # What runs in processes of its own is not imported by the stage.
+        worker=parameter("code of the worker", code_digest.fingerprint("keystab.audit.worker")),
         detectors=parameter(
             "code of keystab's detector", code_digest.fingerprint("keystab.prediction.uncertainty")
         ),

@@ -37,6 +37,7 @@ __all__ = [
     "blobs",
     "condition_of",
     "made_picture",
+    "scene_of",
     "stage_of",
     "views_of",
 ]
@@ -190,19 +191,45 @@ class Stage:
         return View(simulate(self.scene, spec), spec.blur, truth, wanted, spec)
 
 
-def stage_of(
-    picture: NDArray[np.float64],
-    plan: AuditPlan,
-    threads: int = 1,
-    truth: pd.DataFrame | None = None,
-) -> Stage:
-    """Make a scene of a picture: as many of its pixels as views need, and their true extrema.
+def scene_of(picture: NDArray[np.float64], plan: AuditPlan) -> NDArray[np.float64]:
+    """Scene that is made of a picture: as many pixels as views need.
 
     Parameters
     ----------
     picture : ndarray, shape (height, width)
-        Grey values. A large one is seen from farther away first.
+        Grey values. A large one is seen from farther away, a small one is the scene itself.
     plan : AuditPlan
+
+    Returns
+    -------
+    ndarray of float64
+
+    Raises
+    ------
+    InputError
+        If the picture is too small for views of which something is left inside of the margins.
+    """
+    farther = picture.shape[1] / (STEP * SPAN * plan.width)
+    scene = simulate_view(picture, BLUR, farther) if farther > 1 else picture
+    least = math.ceil(3 * MARGIN * STEP * SPAN)
+    if min(scene.shape) < least:
+        needed = math.ceil(least * max(farther, 1.0))
+        raise InputError(
+            f"the picture has {picture.shape[0]} x {picture.shape[1]} pixels; give one of at "
+            f"least {needed} x {needed}"
+        )
+    return scene
+
+
+def stage_of(
+    pixels: NDArray[np.float64], threads: int = 1, truth: pd.DataFrame | None = None
+) -> Stage:
+    """Scene with its true extrema.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (height, width)
+        What `scene_of` returns.
     threads : int
         Threads of the search for extrema.
     truth : DataFrame, optional
@@ -211,24 +238,9 @@ def stage_of(
     Returns
     -------
     Stage
-
-    Raises
-    ------
-    InputError
-        If the picture is too small for views of which something is left inside of the margins.
     """
-    farther = max(1.0, picture.shape[1] / (STEP * SPAN * plan.width))
-    scene = Scene(picture)
-    if farther > 1:
-        scene = Scene(simulate_view(scene, BLUR, farther))
+    scene = Scene(pixels)
     height, width = (int(n / (STEP * SPAN)) for n in scene.shape)
-    least = int(3 * MARGIN)
-    if min(height, width) < least:
-        needed = math.ceil(least * STEP * SPAN)
-        raise InputError(
-            f"the picture has {picture.shape[0]} x {picture.shape[1]} pixels; give one of at "
-            f"least {needed} x {needed}"
-        )
     if truth is not None:
         return Stage(scene, truth, (height, width))
     parts = []

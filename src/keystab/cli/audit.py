@@ -77,15 +77,16 @@ def audit(args: argparse.Namespace) -> None:
 
 def _scene(args: argparse.Namespace, plan: AuditPlan) -> tuple[Stage, str]:
     """The scene that views show, and what to call it."""
-    from keystab.audit.conditions import made_picture, stage_of
+    from keystab.audit.conditions import made_picture, scene_of, stage_of
     from keystab.io.pictures import read_picture
 
     if args.scene is None:
-        return stage_of(made_picture(), plan, args.threads), "a made scene of discs"
+        return stage_of(scene_of(made_picture(), plan), args.threads), "a made scene of discs"
+    picture = read_picture(args.scene)
     try:
-        return stage_of(read_picture(args.scene), plan, args.threads), str(args.scene)
+        return stage_of(scene_of(picture, plan), args.threads), str(args.scene)
     except InputError as error:
-        raise InputError(f"{args.scene}: {str(error).removeprefix(f'{args.scene}: ')}") from None
+        raise InputError(f"{args.scene}: {error}") from None
 
 
 def _convention(text: str | None) -> Convention:

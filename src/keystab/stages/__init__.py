@@ -86,6 +86,7 @@ Error bars
     separation : table of how well guesses tell what returns
 
 Audits
+    scene : pixels of the scene that detectors are shown
     detector : name of a detector, or control
     condition : name of a condition, _ for a blank
     durations : table of the seconds that detectors took

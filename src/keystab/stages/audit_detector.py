@@ -10,7 +10,7 @@ from keystab.stages._command import command
 
 @command
 def main(
-    reference: Path,
+    scene: Path,
     truth: Path,
     plan: AuditPlan,
     detector: str,
@@ -28,7 +28,7 @@ def main(
     from keystab.io.pictures import read_picture
     from keystab.io.tables import read_table, write_table
 
-    stage = stage_of(read_picture(reference), plan, truth=read_table(truth))
+    stage = stage_of(read_picture(scene), truth=read_table(truth))
     shown = Audit([condition_of(condition.replace("_", " "), plan, stage)])
     if detector == CONTROL:
         found = shown.controls()

@@ -7,15 +7,17 @@ from keystab.stages._command import command
 
 
 @command
-def main(reference: Path, plan: AuditPlan, *, table: Path) -> None:
-    """Read the picture; write the extrema of the scene that is made of it, in its pixels."""
-    from keystab.audit.conditions import stage_of
-    from keystab.io.pictures import read_picture
+def main(reference: Path, plan: AuditPlan, *, scene: Path, truth: Path) -> None:
+    """Read the picture; write the scene that is made of it, and its extrema in its pixels."""
+    from keystab.audit.conditions import scene_of, stage_of
+    from keystab.io.pictures import read_picture, write_picture
     from keystab.io.tables import write_table
 
-    truth = stage_of(read_picture(reference), plan).truth
-    write_table(truth, table)
-    print(f"{len(truth)} true extrema of the scene")
+    pixels = scene_of(read_picture(reference), plan)
+    write_picture(pixels, scene)
+    extrema = stage_of(pixels).truth
+    write_table(extrema, truth)
+    print(f"{len(extrema)} true extrema of the scene")
 
 
 if __name__ == "__main__":
