@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import subprocess
 import sys
@@ -511,3 +512,14 @@ def test_the_command_writes_tables_a_figure_and_a_page(here, capsys):
     assert fine.loc["translations", "recall"] > 0.95 and fine["problem"].isna().all()
     assert fine.loc["translations", "own_recall"] > 0.95
     assert "keystab audit mine:detect wrong:nan --quick" in Path("out/audit.md").read_text()
+
+
+def test_the_page_of_documents_is_written_between_its_marks(controls, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    tool = importlib.import_module("audit_page")
+    table = controls.audit.copy()
+    table.loc[table["setting"] == "truth", "detector"] = "mine"
+    text = tool.page(f"head\n{tool.BEGIN}old\n{tool.END}rest\n", table)
+    assert text.startswith("head\n") and text.endswith(f"{tool.END}rest\n") and "old" not in text
+    assert "### mine" in text and "No bias on blobs" in text
+    assert tool.page(text, table) == text

@@ -6,6 +6,10 @@ an environment of its own where there is one (.venv-audit, from audit.lock); put
 How long detectors take stands beside the logs, where no digest counts it.
 """
 
+from keystab.provenance.bare_code import bare_digest
+
+WORKER = code_digest.PACKAGE_FOLDER / "audit/worker.py"
+
 if Path(workflow.basedir, ".venv-audit/bin/python").exists():
     os.environ.setdefault(
         "KEYSTAB_AUDIT_PYTHON", str(Path(workflow.basedir, ".venv-audit/bin/python"))
@@ -60,7 +64,7 @@ rule audit_detector:
             durations=f"{LOG}audit/{{detector}}/{{condition}}_durations.csv",
         ),
         # What runs in processes of its own is not imported by the stage.
-        worker=parameter("code of the worker", code_digest.fingerprint("keystab.audit.worker")),
+        worker=parameter("code of the worker", bare_digest(WORKER.read_bytes())),
         detectors=parameter(
             "code of keystab's detector", code_digest.fingerprint("keystab.prediction.uncertainty")
         ),

@@ -111,7 +111,10 @@ DETECTORS: tuple[Detector, ...] = (
     _library("colmap", "as shipped", convention=COLMAP),
     *_kaze("KAZE"),
     *_kaze("AKAZE"),
-    _library("kornia", "no filters", options={"num_features": 8192}, kappa=None),
+    _library(
+        "kornia", "no filters", convention=Convention(0.0, "xy", 6.0),
+        options={"num_features": 8192}, kappa=None,
+    ),
 )  # fmt: skip
 """All settings of all detectors of libraries: filters off, and as shipped."""
 

@@ -11,7 +11,7 @@ import pandas as pd
 from keystab.audit.conditions import BLOBS, HIGH, LOW
 from keystab.audit.run import CONTROL
 
-__all__ = ["findings", "page"]
+__all__ = ["as_table", "findings", "page"]
 
 PHOTOGRAPH = "translations"
 _TURNED, _NOISY = "rotation 90", "noise 0.03"
@@ -50,9 +50,9 @@ def page(table: pd.DataFrame, command: str, scene: str, figure: str = "audit.png
         f"![Bias, errors, recall and repeatability]({figure})",
         "## Controls",
         "Made of the truth itself: what the measures say where the answer is known.",
-        _as_table(table[table["detector"] == CONTROL]),
+        as_table(table[table["detector"] == CONTROL]),
         "## Detectors",
-        _as_table(table[table["detector"] != CONTROL]),
+        as_table(table[table["detector"] != CONTROL]),
     ]
     for (detector, setting), rows in table[table["detector"] != CONTROL].groupby(
         ["detector", "setting"], sort=False
@@ -172,8 +172,19 @@ def _agreement(measured: dict[str, _Row]) -> Iterable[str]:
                 yield f"{_first_up(name)}: its 90 % ellipses hold {_share(row, 'coverage_90')}."
 
 
-def _as_table(rows: pd.DataFrame) -> str:
-    """A few columns of blobs and of the scene side by side."""
+def as_table(rows: pd.DataFrame) -> str:
+    """A few numbers of each setting, on blobs and on the scene, side by side.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        Rows of `keystab.audit.run.Tables.audit`.
+
+    Returns
+    -------
+    str
+        A table in Markdown.
+    """
     head = [
         "detector", "setting", "convention found", "bias on blobs (y, x; px)",
         "median error (px)", "recall", "precision", "repeatability, 1 px, turned by 90 degrees",

@@ -109,26 +109,18 @@ def colmap(image: Any, camera_blur: float, **options: Any) -> Columns:
 
 
 def kornia(image: Any, camera_blur: float, **options: Any) -> Columns:
-    """Detect with the multi-resolution difference of Gaussians of kornia."""
+    """Detect with the detector of kornia's SIFT in scale-space."""
     import torch
-    from kornia.feature import BlobDoG, ScaleSpaceDetector
-    from kornia.geometry import ConvQuadInterp3d, ScalePyramid
+    from kornia.feature import SIFTFeatureScaleSpace
 
     torch.set_num_threads(1)
-    detector = ScaleSpaceDetector(
-        resp_module=BlobDoG(),
-        subpix_module=ConvQuadInterp3d(10),
-        scale_pyr_module=ScalePyramid(3, 1.6, 32, double_image=True),
-        mr_size=1.0,
-        **options,
-    )
+    detector = SIFTFeatureScaleSpace(upright=True, **options).detector
     with torch.inference_mode():
         frames, response = detector(torch.from_numpy(image.astype(np.float32))[None, None])
     (frames,), (value,) = frames.numpy(), response.numpy()
-    keep = value > 0
     scale = np.sqrt(np.abs(np.linalg.det(frames[:, :, :2])))
     columns = {"y": frames[:, 1, 2], "x": frames[:, 0, 2], "scale": scale, "value": value}
-    return {name: each[keep] for name, each in columns.items()}
+    return {name: each[scale > 0] for name, each in columns.items()}
 
 
 LIBRARIES: dict[str, tuple[Callable[..., Columns], tuple[str, ...]]] = {
