@@ -104,7 +104,7 @@ def findings(rows: pd.DataFrame) -> list[str]:
 def _places(row: _Row, where: str) -> Iterable[str]:
     biases = [row["bias_y"], row["bias_x"]]
     if not any(map(math.isnan, biases)):
-        if max(map(abs, biases)) > _SMALL_BIAS:
+        if any(_is_biased(row, name) for name in ("bias_y", "bias_x")):
             yield (
                 f"**A bias {where}**: {_px(row, 'bias_y')} down and {_px(row, 'bias_x')} right of "
                 "the truth, in the median."
@@ -124,8 +124,9 @@ def _places(row: _Row, where: str) -> Iterable[str]:
         numbers = ", ".join(f"{row[f'phase_{name}']:.2f}" for name in ("yy", "yx", "xy", "xx"))
         yield f"{_first_up(words)} {where} (samples {row['phase_step']:g} px apart: {numbers})."
     if abs(row["scale_bias"]) > _SMALL_SCALE:
+        way = "large" if row["scale_bias"] > 0 else "small"
         ends = _percent_ends(row, "scale_bias")
-        yield f"Scales {where} are {100 * row['scale_bias']:+.1f} % off {ends}."
+        yield f"Scales {where} are {abs(100 * row['scale_bias']):.1f} % too {way} {ends}."
     for axis, way in (("y", "top to bottom"), ("x", "left to right")):
         low, high = row[f"drift_{axis}_low"], row[f"drift_{axis}_high"]
         if (low > _MUCH_DRIFT or high < -_MUCH_DRIFT) and not math.isnan(low):
@@ -228,6 +229,12 @@ def _known(value: Any) -> bool:
 def _first_up(text: str) -> str:
     at = 2 if text.startswith("**") else 0
     return text[:at] + text[at : at + 1].upper() + text[at + 1 :]
+
+
+def _is_biased(row: _Row, name: str) -> bool:
+    """Whether a bias is larger than what matters, and beyond its interval where it has one."""
+    low, high = row[f"{name}_low"], row[f"{name}_high"]
+    return abs(row[name]) > _SMALL_BIAS and not low <= 0 <= high
 
 
 def _px(row: _Row, name: str) -> str:

@@ -58,7 +58,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     table = tables["audit"]
     names = list(dict.fromkeys(zip(table["detector"], table["setting"], strict=True)))
     with style.context():
-        figure = style.new_figure(0.75 + 0.155 * len(names))
+        figure = style.new_figure(0.95 + 0.155 * len(names))
         axes = style.panels(
             figure.add_gridspec(1, 1)[0], 1, 5, wspace=0.02, width_ratios=(1, 1, 1, 1, 1)
         )[0]
@@ -68,7 +68,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         }
         nothing = table.iloc[:0].set_index(["detector", "setting"]).reindex(names)
         scene = by.get(SCENE, nothing)
-        titles = ("bias, blobs", "bias, scene", "error, scene", "found, scene", "repeated")
+        titles = ("bias, blobs", "bias, scene", "error", "found", "repeated")
         for ax, letter, title in zip(axes, "abcde", titles, strict=True):
             style.letter(ax, letter, title)
             ax.set_ylim(len(names) - 0.5, -0.5)
@@ -113,7 +113,7 @@ def _draw_bias(ax: Axes, rows: DataFrame) -> None:
     _dots(ax, rows, "bias_y", colours["y"], -0.16)
     _dots(ax, rows, "bias_x", colours["x"], 0.16)
     ax.axvline(0.0, color=palette.GREY, linewidth=0.6)
-    ax.set_xlim(-0.35, 0.35)
+    ax.set(xlim=(-0.35, 0.35), xticks=(-0.2, 0.0, 0.2))
     _list(ax, [("y, median (px)", colours["y"]), ("x", colours["x"])])
     style.finish_axes(ax)
 
@@ -127,7 +127,7 @@ def _draw_octaves(ax: Axes, table: DataFrame, names: list[tuple[str, str]]) -> N
         own = rows[rows["sigma_low"] == low].set_index(["detector", "setting"]).reindex(names)
         _dots(ax, own, "bias_y", colour, up)
     ax.axvline(0.0, color=palette.GREY, linewidth=0.6)
-    ax.set_xlim(-0.35, 0.35)
+    ax.set(xlim=(-0.35, 0.35), xticks=(-0.2, 0.0, 0.2))
     _list(ax, [("y, first octave (px)", colours[0]), ("second octave", colours[1])])
     style.finish_axes(ax)
 
@@ -152,7 +152,7 @@ def _draw_found(ax: Axes, rows: DataFrame) -> None:
     ax.plot(100 * rows["chance"], np.arange(len(rows)), "|", color=palette.GREY, markersize=5.0)
     ax.set_xlim(-4, 106)
     _list(
-        ax, [("recall (%; grey: chance)", colours["recall"]), ("precision", colours["precision"])]
+        ax, [("recall (%), grey: chance", colours["recall"]), ("precision", colours["precision"])]
     )
     style.finish_axes(ax)
 
@@ -166,8 +166,9 @@ def _draw_repeated(ax: Axes, turned: DataFrame, noisy: DataFrame) -> None:
             markerfacecolor="none",
         )  # fmt: skip
     ax.set_xlim(-4, 106)
-    names = ("turned by 90 degrees (%)", "noise 0.03 (open: matched)")
-    _list(ax, list(zip(names, (palette.INK, palette.NOISY_COLOUR), strict=True)))
+    names = ("turned by 90° (%)", "noise 0.03 (rings:", "at matched number)")
+    colours = (palette.INK, palette.NOISY_COLOUR, palette.NOISY_COLOUR)
+    _list(ax, list(zip(names, colours, strict=True)))
     style.finish_axes(ax)
 
 
