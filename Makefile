@@ -28,11 +28,12 @@ NO_CORES = $(if $(filter 0,$(CORES)),$(error CORES is 0, and Snakemake would wai
     the number of jobs at a time, at least 1))
 OVERLAY = $(if $(WITH),--configfile $(WITH))
 QUICK = --configfile config/quick.yaml
+AUDITED = figures/audit.pdf
 NO_WITH = $(if $(WITH),$(error drafts are of the default picture; for one of yours give folders \
     of their own in $(WITH) and type: make study WITH="config/quick.yaml $(WITH)"))
 
 .DEFAULT_GOAL := help
-.PHONY: help study quick report archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
+.PHONY: help study quick report audit archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
 
 help: ## List the targets
 	@echo "make study                  the whole study"
@@ -55,6 +56,9 @@ figures/% results/%: environment FORCE
 
 report: study ## One HTML file with figures, verdicts, costs and provenance, after the study
 	python tools/report.py $(OVERLAY)
+
+audit: environment .venv-audit/.stamp ## Hold detectors of others against what is there, outside of the study
+	$(SNAKEMAKE) '$(AUDITED)' $(OVERLAY)
 
 why: environment ## What would run, why, and for how long (TARGET=figures/fig5.pdf: for one file)
 	@python tools/why.py $(if $(TARGET),'$(subst ','\'',$(TARGET))') $(OVERLAY)
@@ -93,10 +97,12 @@ format: environment ## Format all code and rules
 	ruff format
 	snakefmt Snakefile workflow
 
-lock: ## Renew environment.lock (needs uv)
+LOCKED = --universal --fork-strategy fewest --generate-hashes --python-version 3.11 --no-header
+
+lock: ## Renew environment.lock and audit.lock (needs uv)
 	@command -v uv >/dev/null || { echo "error: make lock needs uv: pip install uv" >&2; exit 1; }
-	uv pip compile --universal --fork-strategy fewest --generate-hashes --python-version 3.11 \
-	    --all-extras pyproject.toml -o environment.lock --no-header
+	uv pip compile $(LOCKED) --extra study --extra dev pyproject.toml -o environment.lock
+	python tools/audit_requirements.py | uv pip compile $(LOCKED) - -o audit.lock
 
 clean: ## Delete all results, figures and logs
 	rm -rf figures logs
@@ -104,5 +110,8 @@ clean: ## Delete all results, figures and logs
 
 environment:
 	@tools/environment
+
+.venv-audit/.stamp: audit.lock | environment
+	@tools/audit_environment
 
 FORCE:

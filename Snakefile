@@ -25,6 +25,7 @@ include: "workflow/rules/scenes.smk"  # matches and true extrema of several scen
 include: "workflow/rules/theory.smk"  # settings -> tables of what needs no picture
 include: "workflow/rules/claims.smk"  # tables -> verdicts on what the paper says
 include: "workflow/rules/figures.smk"  # tables -> figures, as plan.FIGURES says
+include: "workflow/rules/audit.smk"  # the picture -> detectors of others, where it is asked for
 include: "workflow/rules/checksums.smk"  # all of these -> one list of checksums
 
 

@@ -22,22 +22,29 @@ from keystab._version import __version__
 
 # Where each public name lives.
 _HOME = {
+    "Convention": "io.keypoint_conventions",
     "InputError": "errors",
     "balanced_delta": "scalespace.sampling",
     "detect_keypoints": "detection.detector",
     "edge_blur": "camera.edge_blur",
     "fit_psf": "camera.psf_fit",
+    "from_lafs": "io.keypoint_conventions",
+    "from_opencv": "io.keypoint_conventions",
     "keypoint_uncertainty": "prediction.uncertainty",
     "minimum_unique_set": "matching.unique_keypoints",
     "occurrence": "matching.unique_keypoints",
     "open_scale_space": "io.scale_space_store",
     "open_views": "io.view_store",
+    "read_keypoints": "io.keypoint_files",
     "read_picture": "io.pictures",
     "scale_space": "scalespace.dog",
     "scene_extrema": "truth.scene_extrema",
     "simulate_view": "camera.simulation",
+    "to_lafs": "io.keypoint_conventions",
+    "to_opencv": "io.keypoint_conventions",
     "true_extrema": "truth.true_extrema",
     "unique_keypoints": "matching.unique_keypoints",
+    "write_keypoints": "io.keypoint_files",
 }
 
 __all__ = ["__version__", *sorted(_HOME)]

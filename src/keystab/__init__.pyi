@@ -6,6 +6,13 @@ from keystab.camera.psf_fit import fit_psf as fit_psf
 from keystab.camera.simulation import simulate_view as simulate_view
 from keystab.detection.detector import detect_keypoints as detect_keypoints
 from keystab.errors import InputError as InputError
+from keystab.io.keypoint_conventions import Convention as Convention
+from keystab.io.keypoint_conventions import from_lafs as from_lafs
+from keystab.io.keypoint_conventions import from_opencv as from_opencv
+from keystab.io.keypoint_conventions import to_lafs as to_lafs
+from keystab.io.keypoint_conventions import to_opencv as to_opencv
+from keystab.io.keypoint_files import read_keypoints as read_keypoints
+from keystab.io.keypoint_files import write_keypoints as write_keypoints
 from keystab.io.pictures import read_picture as read_picture
 from keystab.io.scale_space_store import open_scale_space as open_scale_space
 from keystab.io.view_store import open_views as open_views

@@ -275,6 +275,23 @@ class Folds:
 
 
 # ---------------------------------------------------------------------------------------------
+# Audits
+
+
+@dataclass(frozen=True)
+class AuditPlan:
+    """How much is asked of the detectors of others."""
+
+    width: Annotated[
+        int, Setting("audit.width", "width of a view, pixels; less where the picture is small")
+    ]
+    n_views: Annotated[
+        int, Setting("audit.n_views", "views of most conditions; translations have twice as many")
+    ]
+    blobs: Annotated[int, Setting("audit.blobs", "blobs of each size along each side")]
+
+
+# ---------------------------------------------------------------------------------------------
 # Theory
 
 

@@ -24,7 +24,7 @@ from keystab.io.view_store import write_views
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(
     path.relative_to(ROOT).as_posix()
-    for folder in (".", "config", "results", "benchmarks/results")
+    for folder in (".", "config", "docs", "results", "benchmarks/results")
     for path in (ROOT / folder).glob("*.md")
 )
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -141,6 +141,7 @@ def test_commands_of_the_readme_are_understood():
         "truth",
         "inspect",
         "uncertainty",
+        "audit",
     }
     for command in commands:
         build_parser().parse_args(command[1:])  # exits where it does not understand

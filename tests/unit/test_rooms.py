@@ -27,16 +27,17 @@ ROOMS = {
     "evaluation": "root utils matching",  # knows no detector, and so can audit any
     "truth": "root utils scalespace camera detection",
     "prediction": "root utils scalespace detection",
+    "audit": "root camera io evaluation truth",  # detectors of others, in processes of their own
     "experiments": "root utils scalespace camera matching detection evaluation prediction",
     "study": "root utils scalespace camera io matching evaluation",
     "provenance": "root utils io study",
-    "stages": "root utils scalespace camera io matching detection evaluation truth experiments study "
-    "provenance",
+    "stages": "root utils scalespace camera io matching detection evaluation truth audit experiments "
+    "study provenance",
     "figures": "root utils io",  # tables, and no science
-    "cli": "root utils camera io detection truth prediction provenance figures",
+    "cli": "root utils camera io audit provenance figures",
 }
 ALLOWED = {(room, other) for room, others in ROOMS.items() for other in others.split()}
-MOST_ARROWS = 70
+MOST_ARROWS = 74
 MOST_IN_ROOT = 8
 MOST_LINES, MOST_LONG_FILES = 450, 3
 
@@ -111,9 +112,13 @@ def test_rooms_import_from_the_rooms_that_the_table_says_and_no_other():
     assert len(arrows) <= MOST_ARROWS
 
 
+# What uses the package as any program does, and is in no digest of a stage but as itself.
+AT_THE_FRONT_DOOR = ["keystab.audit.worker", "keystab.cli.library"]
+
+
 def test_nobody_inside_goes_through_the_front_door():
     # A new public name would count in the digest of whoever imports from the package itself.
-    assert [name for name, others in OWN.items() if "keystab" in others] == []
+    assert [name for name, others in OWN.items() if "keystab" in others] == AT_THE_FRONT_DOOR
 
 
 def test_no_room_imports_from_a_later_one():

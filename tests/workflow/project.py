@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PARTS = ["Snakefile", "workflow", "profiles", "config", "src", "environment.lock"]
+PARTS = ["Snakefile", "workflow", "profiles", "config", "src", "audit.lock", "environment.lock"]
 IMPORTED_LATE = ("PIL.PngImagePlugin", "smart_open", "snakemake.storage")
 QUICK = ("--configfile", "config/quick.yaml")
 

@@ -7,8 +7,12 @@ import re
 import runpy
 
 import pytest
+import yaml
 from project import QUICK, ROOT
 
+from keystab.audit.conditions import CONDITIONS, PLAN
+from keystab.audit.detectors import DETECTORS
+from keystab.parameters import AuditPlan
 from keystab.study.claims_report import FIELDS
 from keystab.study.plan import FIGURES
 
@@ -23,6 +27,7 @@ def test_whole_study_at_the_papers_settings(planned):
     assert (jobs["detect"], jobs["scale_space"]) == (3 * 17, 3)
     assert sum(jobs.values()) <= 230  # fat jobs
     assert "claims" in jobs and "claims_pictures" not in jobs  # which needs several studies
+    assert not any("audit" in name for name in jobs)  # which needs the detectors of others
 
 
 @pytest.mark.parametrize(
@@ -44,6 +49,20 @@ def test_whole_study_at_the_papers_settings(planned):
 )  # fmt: skip
 def test_figures_need_only_what_they_show(planned, target, rules):
     assert planned.would_run("--configfile", "config/quick.yaml", "--", target).keys() == rules
+
+
+def test_an_audit_is_one_job_for_each_detector_and_condition(planned):
+    jobs = planned.would_run("--", "figures/audit.pdf")
+    assert jobs == {"find_audit_truth": 1, "audit_detector": 8 * 12, "gather_audits": 1, "audit": 1}
+    scene = planned.would_run("--", "figures/scenes/stream/audit.pdf")
+    assert scene == jobs
+
+
+def test_the_conditions_of_the_settings_are_those_of_the_command():
+    config = yaml.safe_load((ROOT / "config/config.yaml").read_text())["audit"]
+    assert tuple(config["conditions"]) == CONDITIONS
+    assert {each.name for each in DETECTORS} == {*config["detectors"], "kornia"}
+    assert AuditPlan(*(config[name] for name in ("width", "n_views", "blobs"))) == PLAN
 
 
 @pytest.mark.parametrize(("keep", "stored"), [("true", 6), ("false", 0)])

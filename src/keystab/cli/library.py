@@ -57,23 +57,23 @@ def simulate(args: argparse.Namespace) -> None:
 
 def detect(args: argparse.Namespace) -> None:
     """Detect the keypoints of a picture and write them as a table."""
-    from keystab.detection.detector import detect_keypoints
+    import keystab
 
-    _tabulate(args, detect_keypoints, ("keypoint", "keypoints"))
+    _tabulate(args, keystab.detect_keypoints, ("keypoint", "keypoints"))
 
 
 def uncertainty(args: argparse.Namespace) -> None:
     """Detect keypoints, with error bars and the chance that each is found again."""
-    from keystab.prediction.uncertainty import keypoint_uncertainty
+    import keystab
 
-    _tabulate(args, keypoint_uncertainty, ("keypoint", "keypoints"))
+    _tabulate(args, keystab.keypoint_uncertainty, ("keypoint", "keypoints"))
 
 
 def truth(args: argparse.Namespace) -> None:
     """Find the true extrema of a picture and write them as a table."""
-    from keystab.truth.true_extrema import true_extrema
+    import keystab
 
-    _tabulate(args, true_extrema, ("extremum", "extrema"))
+    _tabulate(args, keystab.true_extrema, ("extremum", "extrema"))
 
 
 def blur(args: argparse.Namespace) -> None:

@@ -38,6 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with, 130 when interrupted.
     """
     args = build_parser().parse_args(argv)
+    args.typed = (sys.argv[1:] if argv is None else list(argv))[1:]
     forget_outdated()
     status = None
     try:

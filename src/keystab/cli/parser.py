@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from keystab._version import __version__
+from keystab.cli.audit import audit
 from keystab.cli.library import blur, detect, inspect, simulate, truth, uncertainty
 from keystab.cli.study import archive, reference, verify, whence
 
@@ -75,6 +76,17 @@ def build_parser() -> argparse.ArgumentParser:
             description="Find all extrema of the continuous difference-of-Gaussians scale-space "
             "of a picture, to some twelve digits: what a detector at any sampling should find.",
             formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        )
+    )
+    _audit_arguments(
+        commands.add_parser(
+            "audit",
+            help="hold detectors of others, or one of your own, against what is there",
+            description="Show detectors views of a scene and isolated blobs whose extrema are "
+            "known, and write what they find of these, how far off it is and what two views "
+            "share: audit.csv, a figure, and audit.md, which says it in words. Of libraries: "
+            "opencv, skimage, vlfeat, colmap, kaze, akaze, kornia, keystab, where they are "
+            "installed (pip install 'keystab[audit]').",
         )
     )
     to = commands.add_parser(
@@ -348,6 +360,48 @@ def _truth_arguments(to: argparse.ArgumentParser) -> None:
         to.add_argument("--threads", type=int, default=1, metavar="N", help="threads"),
     ]  # fmt: skip
     to.set_defaults(parameters=[flag.dest for flag in flags])
+
+
+def _audit_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=audit)
+    to.add_argument(
+        "detectors", metavar="DETECTOR", nargs="+",
+        help="a library's name; module:function, a function of a grey image in [0, 1] and its "
+        "camera blur that returns a table with y, x, sigma, rows of them, or a list of "
+        "cv2.KeyPoint; or a command in quotes, \"my_detector {picture} {table}\", that reads a PNG "
+        "and writes a CSV with y, x, sigma in its first line",
+    )  # fmt: skip
+    to.add_argument(
+        "-o", "--output", metavar="FOLDER", type=Path, required=True, help="folder to write to"
+    )
+    to.add_argument(
+        "--scene", metavar="PICTURE", type=Path,
+        help=f"what views show: {_PICTURE}; a made scene if not given",
+    )  # fmt: skip
+    to.add_argument("--quick", action="store_true", help="fewer and smaller views")
+    to.add_argument(
+        "--convention", metavar="ORIGIN,ORDER,SCALE",
+        help="what your own detector means, such as 0.5,xy,diameter: coordinate of the centre of "
+        "the first pixel; yx or xy, the order of rows without names; sigma, radius, diameter or "
+        "how many times sigma; 0,yx,sigma if not given",
+    )  # fmt: skip
+    to.add_argument(
+        "--python", metavar="PATH",
+        help="Python that runs the detectors, of an environment that has them and numpy; this one "
+        "if not given",
+    )  # fmt: skip
+    to.add_argument(
+        "--time-limit", type=_seconds, default=20.0, metavar="S",
+        help="seconds that a detector may take for a picture (default 20)",
+    )  # fmt: skip
+    to.add_argument("--threads", type=int, default=1, metavar="N", help="threads of the truth")
+
+
+def _seconds(text: str) -> float:
+    with suppress(ValueError):
+        if 0 < float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is no time; give a number of seconds above 0")
 
 
 def _blur(text: str) -> float | str:

@@ -106,6 +106,14 @@ OPERATOR_COLOURS = {"dog": "#0072B2", "laplacian": "#009E73"}
 ASSUMED_COLOURS = {"below": "#D55E00", "right": INK, "above": "#0072B2"}
 """An assumed blur below, equal to and above that of the camera (figure S4)."""
 
+AXIS_COLOURS = {"y": "#D55E00", "x": "#0072B2"}
+"""Down and right (figure audit)."""
+
+OCTAVE_COLOURS = (INK, "#009E73")
+"""First and second octave (figure audit)."""
+
+NOISY_COLOUR = "#A8458A"
+"""Views with noise beside those without (figure audit)."""
 
 _SHADES = (
     "#60ceac", "#40b7ad", "#359eaa", "#3485a5", "#366ca0", "#3d5195", "#403a76", "#36274d",

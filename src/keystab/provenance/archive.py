@@ -42,14 +42,16 @@ __all__ = ["MORE", "SOURCES", "Contents", "about_study", "is_final", "pack", "pu
 
 SOURCES = (
     "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "DEVIATIONS.md", "LICENSE", "Makefile",
-    "README.md", "REPRODUCING.md", "Snakefile", "environment.lock", "pyproject.toml",
+    "README.md", "REPRODUCING.md", "Snakefile", "audit.lock", "environment.lock", "pyproject.toml",
     "results/README.md", ".ci", "benchmarks", "config", "docs", "profiles", "src", "tests", "tools",
     "workflow",
 )  # fmt: skip
 """Files and folders that make up the project; a file that a copy lacks is not missed."""
 
 MORE = ("*.html", "report/*.html", "claims_pictures.*")
-"""Results that are made only where they are asked for, by their places in the folder of results."""
+AUDIT = ("tables/audit*.csv",)
+"""Results that are made only where they are asked for, by their places in the folder of results;
+those of an audit are no part of the study, and go into no archive of it."""
 
 _PLAIN, _EXECUTABLE = 0o644, 0o755
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that the format knows
@@ -192,6 +194,8 @@ def publish(study: Study, folder: Path | None = None) -> Path:
     }
     for number, overlay in enumerate(study.overlays, 1):
         files[_overlay(number, overlay)] = (project / overlay).read_bytes()
+    for path in _audit(study):
+        files[f"audit/{path.name}"] = path.read_bytes()
     files[ABOUT] = _about(contents)
     files[LEFT_OUT] = _listed(big, contents).encode()
     files[SUMS] = _sums(files)
@@ -200,6 +204,13 @@ def publish(study: Study, folder: Path | None = None) -> Path:
             (part / name).parent.mkdir(parents=True, exist_ok=True)
             (part / name).write_bytes(data)
     return folder
+
+
+def _audit(study: Study) -> list[Path]:
+    """Tables and figure of an audit, where one was asked for."""
+    tables = [path for name in AUDIT for path in (study.project / study.results).glob(name)]
+    figure = study.project / study.figures / "audit.png"
+    return sorted([*tables, figure] if tables and figure.is_file() else tables)
 
 
 def _about(contents: Contents) -> bytes:

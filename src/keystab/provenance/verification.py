@@ -51,7 +51,7 @@ from keystab.study.settings import Settings
 __all__ = ["check_archive", "check_here", "check_reference_itself", "copy_workflow", "report"]
 
 _MOST_NAMED, _MOST_LETTERS = 10, 400
-_WORKFLOW = ("Snakefile", "environment.lock", "workflow", "profiles", "config")
+_WORKFLOW = ("Snakefile", "audit.lock", "environment.lock", "workflow", "profiles", "config")
 _MOST_SECONDS = 60.0
 
 

@@ -88,6 +88,18 @@ Error bars
     moved_digest : checksums of the store of these views
     weights : table of the errors of motion and depth from weighted keypoints
 
+Audits
+    scene : pixels of the scene that detectors are shown
+    detector : name of a detector, or control
+    condition : name of a condition, _ for a blank
+    durations : table of the seconds that detectors took
+    audit : table of what was found of detectors
+    octaves : the same by octave
+    phases : table of errors against the sub-pixel phase
+    audits : tables of what was found of each detector in each condition
+    audits_by_octave : the same by octave
+    audits_by_phase : tables of errors against the sub-pixel phase
+
 Theory
     profiles : table of profiles of point spread functions
     camera_blur : camera blur, pixels

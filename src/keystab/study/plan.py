@@ -386,6 +386,34 @@ def those_available(asked: list[int], available: list[int]) -> list[int]:
 
 
 # ---------------------------------------------------------------------------------------------
+# Audits
+
+
+class Audited(NamedTuple):
+    """A detector of others in one condition."""
+
+    detector: str
+    condition: str
+    """With underscores for blanks, as in names of files."""
+
+
+def audits(settings: Settings) -> list[Audited]:
+    """Detectors that are audited, the controls first, each in all conditions.
+
+    Examples
+    --------
+    >>> audits({"audit": {"detectors": ["opencv"], "conditions": ["blobs", "blur 0.3"]}})[-1]
+    Audited(detector='opencv', condition='blur_0.3')
+    """
+    about = settings["audit"]
+    return [
+        Audited(detector, condition.replace(" ", "_"))
+        for detector in ("control", *about["detectors"])
+        for condition in about["conditions"]
+    ]
+
+
+# ---------------------------------------------------------------------------------------------
 # What the study ends in
 
 

@@ -1,0 +1,1 @@
+"""Detectors of others behind one signature, and what is asked of them."""
