@@ -63,4 +63,4 @@ def __dir__() -> list[str]:
 
 @cache
 def _forget_outdated_loops() -> None:
-    import_module("keystab.provenance.compiled_loops").forget_outdated()
+    import_module("keystab.utils.compiled_loops").forget_outdated()

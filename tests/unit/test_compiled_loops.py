@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from keystab.provenance.compiled_loops import PACKAGE_FOLDER, STAMP, forget_outdated
+from keystab.utils.compiled_loops import PACKAGE_FOLDER, STAMP, forget_outdated
 
 ROOMS = (".", "near", "far/away")
 

@@ -12,7 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from keystab.camera.common_field import in_common_field, to_common_frame, windows_of_common_field
+from keystab.camera.common_field import (
+    common_scales,
+    in_common_field,
+    to_common_frame,
+    windows_of_common_field,
+)
 from keystab.camera.simulation import Scene, simulate
 from keystab.camera.view_sets import expanded, members, per_view, view_shapes, view_specs
 from keystab.camera.views import ViewSpec, to_reference, to_view
@@ -26,7 +31,7 @@ from keystab.experiments.view_stability import (
     localization_table,
     scale_table,
 )
-from keystab.matching.common_range import CommonRange, common_scales
+from keystab.matching.common_range import CommonRange
 from keystab.matching.correspondence import matched
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}

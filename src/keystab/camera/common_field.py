@@ -182,3 +182,44 @@ def _cut(corners: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[n
             share = height[k] / (height[k] - height[after])
             kept.append(corners[k] + share * (corners[after] - corners[k]))
     return np.array(kept).reshape(-1, 2)
+
+
+def common_scales(
+    specs: Sequence[ViewSpec],
+    sigma_min: float,
+    n_oct: int,
+    first_scale: float,
+    last_scale: float | None,
+) -> tuple[float, float]:
+    """Range of scales that all views of a set cover, in pixels of the first view.
+
+    Parameters
+    ----------
+    specs : sequence of ViewSpec
+        The views.
+    sigma_min : float
+        First scale of the scale-space of every view, in its pixels.
+    n_oct : int
+        Octaves of every scale-space.
+    first_scale : float
+        Lower end of the range of a single view, over `sigma_min`.
+    last_scale : float or None
+        Upper end of it, over `sigma_min`; none if None, unless the views have different zooms:
+        then the end of the last octave.
+
+    Returns
+    -------
+    low, high : float
+        ``low > high`` where there is no common range; `high` is infinite where there is no end.
+
+    Examples
+    --------
+    >>> specs = [ViewSpec(1.1, step, (9, 9)) for step in (10.0, 15.0)]
+    >>> low, high = common_scales(specs, 1.0, 2, 1.25, None)
+    >>> low, high
+    (1.875, 4.0)
+    """
+    zooms = [spec.step / specs[0].step for spec in specs]
+    if last_scale is None:
+        last_scale = 2.0**n_oct if max(zooms) > min(zooms) else float("inf")
+    return sigma_min * first_scale * max(zooms), sigma_min * last_scale * min(zooms)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,6 +57,8 @@ class PsfFit:
         -pi / 2 to pi / 2.
     general_residual : float
         As `residual`, for the general Gaussian.
+    background : float
+        Level that was subtracted, in units of the picture.
     """
 
     blur: float
@@ -67,9 +70,12 @@ class PsfFit:
     minor: float
     angle: float
     general_residual: float
+    background: float
 
 
-def fit_psf(psf: ArrayLike, oversampling: float = 1.0, background: float = 0.0) -> PsfFit:
+def fit_psf(
+    psf: ArrayLike, oversampling: float = 1.0, background: float | Literal["border"] = 0.0
+) -> PsfFit:
     """Fit a Gaussian to a picture of a point spread function, in least squares.
 
     Height, centre and width are free. What is fitted is what the sensor samples, the spread of the
@@ -81,8 +87,9 @@ def fit_psf(psf: ArrayLike, oversampling: float = 1.0, background: float = 0.0) 
         The point spread function, its largest values in the bump. No gamma: proportional to light.
     oversampling : float, default 1
         Samples of the picture per pixel of the camera, > 0.
-    background : float, default 0
-        Level that is subtracted first, in units of the picture; see `border_level`.
+    background : float or "border", default 0
+        Level that is subtracted first, in units of the picture; or that of the picture's border,
+        see `border_level`.
 
     Returns
     -------
@@ -108,7 +115,8 @@ def fit_psf(psf: ArrayLike, oversampling: float = 1.0, background: float = 0.0) 
     (0.7, 16.3, 15.8)
     """
     validation.number("oversampling", oversampling, above=0)
-    light = _picture(psf) - validation.number("background", background)
+    level = border_level(psf) if background == "border" else background
+    light = _picture(psf) - validation.number("background", level)
     if light.size > _MOST_SAMPLES:
         raise InputError(
             f"the picture has {light.shape[0]} x {light.shape[1]} samples, allowed are "
@@ -141,6 +149,7 @@ def fit_psf(psf: ArrayLike, oversampling: float = 1.0, background: float = 0.0) 
         minor=math.exp(log_mean - stretch) / oversampling,
         angle=angle if angle > 1e-9 - math.pi / 2 else angle + math.pi,  # one name for one axis
         general_residual=general_residual,
+        background=float(level),
     )
 
 

@@ -19,11 +19,7 @@ if TYPE_CHECKING:
 
 def simulate(args: argparse.Namespace) -> None:
     """Take a view of a picture with the simulated camera and write it."""
-    import dataclasses
-
-    from keystab.camera.simulation import Scene, whole_shape
-    from keystab.camera.simulation import simulate as take
-    from keystab.camera.views import ViewSpec
+    import keystab
     from keystab.io.pictures import FORMATS, read_picture, write_picture
     from keystab.utils.files import check_writable
     from keystab.utils.validation import number
@@ -31,20 +27,16 @@ def simulate(args: argparse.Namespace) -> None:
     check_writable(args.out, FORMATS)
     if args.picture.exists() and args.out.exists() and args.out.samefile(args.picture):
         raise InputError(f"{args.out} is the picture itself; give another name to the view")
-    # Bad values are refused before the picture is read, which also decides the default shape.
-    spec = ViewSpec(
+    view = keystab.simulate_view(
+        read_picture(args.picture),
         args.blur,
         args.step,
-        tuple(args.shape or (1, 1)),
+        args.shape and tuple(args.shape),
         tuple(args.shift),
         math.radians(number("rotation", args.rotation)),
         args.noise,
         args.seed,
     )
-    scene = Scene(read_picture(args.picture))
-    if args.shape is None:
-        spec = dataclasses.replace(spec, shape=whole_shape(scene.shape, args.step))
-    view = take(scene, spec)
     write_picture(view, args.out)
     outside = int(((view < 0) | (view > 1)).sum())
     pixels = f"{outside} pixel{'s' * (outside != 1)}"
@@ -78,13 +70,12 @@ def truth(args: argparse.Namespace) -> None:
 
 def blur(args: argparse.Namespace) -> None:
     """Fit a Gaussian to the picture of a point spread function and say how wide it is."""
-    from keystab.camera.psf_fit import border_level, fit_psf
+    import keystab
     from keystab.io.pictures import read_picture
 
     picture = read_picture(args.picture)
     try:
-        background = border_level(picture) if args.background == "border" else args.background
-        fit = fit_psf(picture, args.oversampling, background)
+        fit = keystab.fit_psf(picture, args.oversampling, args.background)
     except InputError as error:
         raise InputError(f"{args.picture}: {error}") from None
     print(
@@ -94,7 +85,7 @@ def blur(args: argparse.Namespace) -> None:
         f"the longer at {math.degrees(fit.angle):.0f} degrees from x towards y\n"
         f"residual         {fit.residual:.1%} of the picture's root mean square; "
         f"{fit.general_residual:.1%} with two axes\n"
-        f"background       {background:.4g}"
+        f"background       {fit.background:.4g}"
     )
 
 
@@ -171,10 +162,10 @@ def _summary(args: argparse.Namespace, found: pd.DataFrame) -> str:
 
 def _blur_of_edges(args: argparse.Namespace, image: np.ndarray) -> float:
     """Camera blur from the picture's edges; says what was found and what a wrong one does."""
-    from keystab.camera.edge_blur import edge_blur
+    import keystab
 
     try:
-        found = edge_blur(image)
+        found = keystab.edge_blur(image)
     except InputError as error:
         raise InputError(f"{args.picture}: {error}") from None
     # An extremum at sigma of a picture of blur c lies at the same sigma^2 - c^2, whatever c is.

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from keystab.cli.parser import BAD_INPUT, build_parser
 from keystab.errors import InputError
-from keystab.provenance.compiled_loops import forget_outdated
+from keystab.utils.compiled_loops import forget_outdated
 from keystab.utils.memory import require_start, too_little
 
 __all__ = ["main"]

@@ -206,10 +206,14 @@ def _of_region(space: ScaleSpace, tolerance: float, rows: slice, columns: slice)
         (max(part.start - 1, 0), min(part.stop + 1, n))
         for part, n in zip((rows, columns), space.shape[1:], strict=True)
     )
+    found = [np.empty((0, 4), dtype=np.int64)]
     if bottom - top < 3 or right - left < 3:
-        return np.empty((0, 4), dtype=np.int64)
-    dog = space.window(slice(None), slice(top, bottom), slice(left, right))
-    return extrema_of_array(dog, tolerance - space.rounding_bounds.between, (top, left))
+        return found[0]
+    for first, last in ranges(top + 1, bottom - 1, BLOCK_ROWS):  # bounds the memory
+        dog = space.window(slice(None), slice(first - 1, last + 1), slice(left, right))
+        least = tolerance - space.rounding_bounds.between
+        found.append(extrema_of_array(dog, least, (first - 1, left)))
+    return np.concatenate(found)
 
 
 def _evaluated(

@@ -2,24 +2,41 @@
 
 from __future__ import annotations
 
+from typing import Any, Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from keystab.detection.extrema import decided, extrema_of_array
 from keystab.errors import InputError
-from keystab.io.scale_space_store import TILE, StoredScaleSpace
 from keystab.scalespace.dog import ScaleSpace
 from keystab.utils.progress import progress
 
 
-def stored_extrema(
-    store: StoredScaleSpace, space: ScaleSpace, epsilon: float = 0.0
-) -> NDArray[np.int64]:
+class Stored(Protocol):
+    """A scale-space that is read, as `keystab.io.scale_space_store.StoredScaleSpace`."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of slices, rows and columns."""
+
+    @property
+    def tile_height(self) -> int:
+        """Rows that are best read at once."""
+
+    def window(self, *, rows: slice) -> NDArray[np.float64]:
+        """Values of some rows, shape (n_slices, n_rows, n_columns)."""
+
+    def attributes(self) -> dict[str, Any]:
+        """What the scale-space was made of."""
+
+
+def stored_extrema(store: Stored, space: ScaleSpace, epsilon: float = 0.0) -> NDArray[np.int64]:
     """Find all discrete extrema of a stored scale-space, one row of tiles at a time.
 
     Parameters
     ----------
-    store : StoredScaleSpace
+    store : Stored
         Where the values are read from.
     space : ScaleSpace
         The scale-space that was stored. It says what rounding can explain, and the store must be
@@ -42,9 +59,9 @@ def stored_extrema(
     n_rows = store.shape[1]
     found = [np.empty((0, 4), dtype=np.int64)]
     above = np.empty((store.shape[0], 0, store.shape[2]))  # last two rows of the tiles before
-    starts = range(0, n_rows, TILE)
+    starts = range(0, n_rows, store.tile_height)
     for top in progress(starts, len(starts), f"extrema of {n_rows} stored rows"):
-        rows = store.window(rows=slice(top, min(top + TILE, n_rows)))
+        rows = store.window(rows=slice(top, min(top + store.tile_height, n_rows)))
         rows = np.concatenate([above, rows], axis=1)
         found.append(
             extrema_of_array(
@@ -55,7 +72,7 @@ def stored_extrema(
     return decided(space, np.concatenate(found), tolerance)[0]
 
 
-def _require_same(store: StoredScaleSpace, space: ScaleSpace) -> None:
+def _require_same(store: Stored, space: ScaleSpace) -> None:
     stored = store.attributes()
     for name, wanted in space.attributes().items():
         wanted = list(wanted) if isinstance(wanted, tuple) else wanted

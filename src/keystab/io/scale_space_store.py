@@ -175,6 +175,12 @@ class StoredScaleSpace:
         n_slices, height, width = self._dog.shape
         return n_slices, height, width
 
+    @property
+    def tile_height(self) -> int:
+        """Rows of samples in a row of tiles."""
+        assert self._dog.shards is not None
+        return int(self._dog.shards[1])
+
     def window(
         self,
         slices: slice = slice(None),

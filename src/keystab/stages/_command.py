@@ -67,7 +67,7 @@ def command(function: Callable[..., None]) -> Callable[..., int]:
             require_start()
             if "NUMBA_CACHE_DIR" not in os.environ:
                 # No plain import: it changes no result, and what a stage imports is in its digest.
-                import_module("keystab.provenance.compiled_loops").forget_outdated()
+                import_module("keystab.utils.compiled_loops").forget_outdated()
             function(**arguments)
         except InputError as error:
             print(f"error: {error}", file=sys.stderr)

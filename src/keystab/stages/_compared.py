@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from keystab.camera.common_field import common_scales
 from keystab.io.view_store import Views
-from keystab.matching.common_range import CommonRange, common_scales, comparable
+from keystab.matching.common_range import CommonRange, comparable
 from keystab.parameters import Compared, ComparedInViews
 
 Inside = Callable[[pd.DataFrame, str], NDArray[np.bool_]]

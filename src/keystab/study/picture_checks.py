@@ -11,12 +11,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from keystab.camera.common_field import common_field_is_empty
+from keystab.camera.common_field import common_field_is_empty, common_scales
 from keystab.camera.view_sets import per_view, view_shapes, view_specs
 from keystab.camera.views import effective_blur
 from keystab.errors import InputError
 from keystab.io.pictures import picture_shape
-from keystab.matching.common_range import common_scales
 from keystab.scalespace.sampling import Sampling, balanced_delta
 from keystab.study.plan import kept_n_spo
 from keystab.study.scenes import further_pictures
