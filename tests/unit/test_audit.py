@@ -529,9 +529,14 @@ def test_the_page_of_documents_is_written_between_its_marks(controls, monkeypatc
     table = controls.audit.copy()
     table.loc[table["setting"] == "truth", "detector"] = "mine"
     text = tool.page(f"head\n{tool.BEGIN}stale words\n{tool.END}rest\n", table)
-    assert text.startswith("head\n") and text.endswith(f"{tool.END}rest\n") and "stale words" not in text
+    assert (
+        text.startswith("head\n")
+        and text.endswith(f"{tool.END}rest\n")
+        and "stale words" not in text
+    )
     assert "### mine" in text and "No bias on blobs" in text
     assert tool.page(text, table) == text
+    assert tool.main(["--check"]) == 0  # docs/audit.md says what results/reference/audit says
 
 
 def test_the_figure_draws_every_setting_where_its_numbers_are(controls):
