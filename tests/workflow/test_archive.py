@@ -379,6 +379,24 @@ def test_the_reference_holds_what_is_small_and_is_compared_with(here, monkeypatc
     )
 
 
+def test_an_audit_beside_a_study_is_neither_missed_nor_in_its_way(here, monkeypatch, capsys):
+    monkeypatch.chdir(here.project)
+    assert cli.main(["verify"]) == 0  # nobody asked for one
+    (here.project / "results/tables/audit.csv").write_text("detector,bias_y\nopencv,0.25\n")
+    (here.project / "figures/audit.png").write_bytes(b"a figure")
+    assert cli.main(["verify"]) == 0, capsys.readouterr().out
+    assert cli.main(["reference"]) == 0
+    folder = here.project / "results/reference/audit"
+    assert {path.name for path in folder.iterdir()} == {"audit.csv", "audit.png"}
+    assert cli.main(["verify"]) == 0
+    assert cli.main(["archive"]) == 0
+    (packed,) = (here.project / "results/archive").iterdir()
+    names = zipfile.ZipFile(packed).namelist()
+    assert not any(name.startswith(("results/tables/audit", "figures/audit")) for name in names)
+    (folder / "audit.csv").write_text("detector,bias_y\nopencv,0.00\n")
+    assert cli.main(["verify"]) == 1  # a reference that was changed
+
+
 def test_whence_follows_a_figure_to_the_scene_and_says_what_changed(here, monkeypatch, capsys):
     monkeypatch.chdir(here.project / "results")
     assert cli.main(["whence", "../figures/fig1.pdf"]) == 0

@@ -40,8 +40,9 @@ def audit(args: argparse.Namespace) -> None:
         raise InputError(f"--python {python}: no such program; give the path of a Python")
     detectors = chosen(args.detectors, _convention(args.convention))
     plan = QUICK if args.quick else PLAN
+    _say(start, f"{len(detectors)} settings of detectors; finding what there is to be found")
     stage, scene = _scene(args, plan)
-    _say(start, f"{len(detectors)} settings of detectors, {scene}")
+    _say(start, f"{len(stage.truth)} true extrema of {scene}")
     conditions = [condition_of(name, plan, stage) for name in CONDITIONS]
     views = sum(len(condition.views) for condition in conditions)
     _say(start, f"{len(conditions)} conditions, {views} pictures")

@@ -26,6 +26,8 @@ from keystab.provenance.lineage import file_digest
 from keystab.provenance.ro_crate import Item, crate_text
 from keystab.provenance.run_description import (
     ABOUT,
+    AUDIT_FIGURES,
+    AUDIT_TABLES,
     LEFT_OUT,
     LEFT_OUT_COLUMNS,
     SUMS,
@@ -49,9 +51,7 @@ SOURCES = (
 """Files and folders that make up the project; a file that a copy lacks is not missed."""
 
 MORE = ("*.html", "report/*.html", "claims_pictures.*")
-AUDIT = ("tables/audit*.csv",)
-"""Results that are made only where they are asked for, by their places in the folder of results;
-those of an audit are no part of the study, and go into no archive of it."""
+"""Results that are made only where they are asked for, by their places in the folder of results."""
 
 _PLAIN, _EXECUTABLE = 0o644, 0o755
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that the format knows
@@ -207,10 +207,10 @@ def publish(study: Study, folder: Path | None = None) -> Path:
 
 
 def _audit(study: Study) -> list[Path]:
-    """Tables and figure of an audit, where one was asked for."""
-    tables = [path for name in AUDIT for path in (study.project / study.results).glob(name)]
-    figure = study.project / study.figures / "audit.png"
-    return sorted([*tables, figure] if tables and figure.is_file() else tables)
+    """Tables and PNG figure of an audit, where one was asked for."""
+    tables = [study.project / study.results / "tables" / name for name in AUDIT_TABLES]
+    figures = [study.project / study.figures / name for name in AUDIT_FIGURES if "png" in name]
+    return [path for path in (*tables, *figures) if path.is_file()]
 
 
 def _about(contents: Contents) -> bytes:

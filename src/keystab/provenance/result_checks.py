@@ -19,7 +19,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from keystab.errors import InputError
 from keystab.provenance.foreign_tables import read_foreign_table
 from keystab.provenance.lineage import code_of_figure, file_digest, read_figure_metadata
-from keystab.provenance.run_description import LEFT_OUT, LEFT_OUT_COLUMNS, About
+from keystab.provenance.run_description import (
+    AUDIT_FIGURES,
+    AUDIT_TABLES,
+    LEFT_OUT,
+    LEFT_OUT_COLUMNS,
+    About,
+)
 from keystab.provenance.snakemake_records import Record
 from keystab.study.column_relations import broken_relations
 
@@ -112,13 +118,15 @@ class Run(NamedTuple):
 
     @property
     def tables(self) -> list[Path]:
-        """All its tables."""
-        return self.files(f"{self.about.results}/tables", ".csv", ".parquet")
+        """All its tables; not those of an audit, which is no part of it."""
+        paths = self.files(f"{self.about.results}/tables", ".csv", ".parquet")
+        return [path for path in paths if path.name not in AUDIT_TABLES]
 
     @property
     def figures(self) -> list[Path]:
-        """All its figures."""
-        return self.files(self.about.figures, ".pdf", ".png")
+        """All its figures; not that of an audit."""
+        paths = self.files(self.about.figures, ".pdf", ".png")
+        return [path for path in paths if path.name not in AUDIT_FIGURES]
 
     @property
     def verdicts(self) -> list[Path]:

@@ -15,6 +15,8 @@ from keystab.study.result_folders import folder_problem
 
 __all__ = [
     "ABOUT",
+    "AUDIT_FIGURES",
+    "AUDIT_TABLES",
     "LEFT_OUT",
     "LEFT_OUT_COLUMNS",
     "SUMS",
@@ -29,6 +31,9 @@ ABOUT = "archive.json"
 SUMS = "SHA256SUMS"
 LEFT_OUT = "left-out.csv"
 LEFT_OUT_COLUMNS = ["path", "bytes", "sha256", "rule"]
+AUDIT_TABLES = ("audit.csv", "audit_octaves.csv", "audit_phases.csv")
+AUDIT_FIGURES = ("audit.pdf", "audit.png")
+"""What an audit leaves beside the tables and figures of a study, of which it is no part."""
 MOST_BYTES_OF_ABOUT = 1_000_000
 
 _DIGEST = re.compile("[0-9a-f]{64}")
