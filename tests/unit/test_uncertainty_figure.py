@@ -86,7 +86,7 @@ def test_no_motion_leaves_its_panel_empty(tables):
         ratio=np.nan, ratio_low=np.nan, ratio_high=np.nan
     )
     figure = uncertainty.draw(tables | {"uncertainty_weights": nothing})
-    assert figure.axes[-1].get_ylim()[1] == 1.1
+    assert figure.axes[-1].get_ylim()[1] > 1
 
 
 def test_a_missing_column_is_named(tables):

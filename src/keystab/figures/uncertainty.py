@@ -220,7 +220,7 @@ def _coverage_axis(ax: Axes, rows: DataFrame) -> None:
 def _noise_axis(ax: Axes, noise: Any) -> None:
     noise = np.sort(noise)
     style.log_x_axis(ax, noise[0] / 1.15, noise[-1] * 1.15)
-    ax.set_xlim(noise[0] / 1.15, noise[-1] * 1.15)
+    ax.set_xlim(noise[0] / 1.25, noise[-1] * 1.25)
     ax.set_xlabel("noise (grey range 1)")
 
 
@@ -285,9 +285,15 @@ def _draw_weights(ax: Axes, table: DataFrame) -> None:
             ax.plot(at, own["ratio"], color=colour, linestyle=line, marker="o", linewidth=1.0,
                     markerfacecolor=face, label=f"{task} {kept}")  # fmt: skip
     _noise_axis(ax, shown["noise"].unique())
-    low, high = np.nanmin([*shown["ratio_low"], 1.0]), np.nanmax([*shown["ratio_high"], 1.1])
-    ax.set_ylim(low - 0.65 * (high - low), high)
-    ax.set_ylabel("error over that of equal weights")
+    low, high = np.nanmin([*shown["ratio_low"], 0.8]), np.nanmax([*shown["ratio_high"], 1.1])
+    ax.set_yscale("log")
+    ax.set_ylim(low * (low / high) ** 0.6, high * 1.03)  # names stand below the lines
+    ax.set_yticks(
+        [tick for tick in (0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 4.0) if low / 1.1 < tick < high]
+    )
+    ax.set_yticks([], minor=True)
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    ax.set_ylabel("error (equal weights: 1)")
     _name(ax, [*TASKS.values(), ("open: survival ≥ 50 %", palette.GREY)])
 
 
