@@ -198,6 +198,8 @@ def test_pictures_are_described(photo):
         (Path("photo.png"), r"keystab.read_picture\(path\)"),
         (np.zeros((9, 9, 3)), "which is colour"),
         (np.zeros((9, 9, 4)), "which is colour"),
+        (np.full((9, 9), -1e300), "grey values up to 1e[+]300, allowed are"),
+        (np.full((9, 9), 1e-300), "grey values up to 1e-300, allowed are"),
     ],
 )
 @pytest.mark.parametrize("function", [detect_keypoints, keypoint_uncertainty])

@@ -123,7 +123,10 @@ def detect_keypoints(
     >>> found.loc[found["value"].idxmin(), ["y", "x", "sigma"]].round(2).tolist()
     [20.0, 20.0, 1.78]
     """
-    n_oct = number_of_octaves(n_oct, checked_image(image).shape, sigma_min)
+    array = checked_image(image)
+    n_oct = number_of_octaves(n_oct, array.shape, sigma_min)
+    if refine:
+        _require_grey_values(array)
     validation.count("max_iterations", max_iterations, least=1)
     validation.limit("max_offset", max_offset, above=0)
     validation.integer("n_spo", n_spo, least=1)
@@ -163,6 +166,16 @@ def detect_keypoints(
         for name in names
     }
     return pd.DataFrame(kept)
+
+
+def _require_grey_values(image: np.ndarray) -> None:
+    """Refuse values of which products of three do not exist, as the refinement needs them."""
+    largest = max(float(image.max()), -float(image.min()))
+    if largest and not 1e-90 <= largest <= 1e90:
+        raise InputError(
+            f"the image has grey values up to {largest:g}, allowed are 1e-90 to 1e90: divide it by "
+            f"{largest:g}"
+        )
 
 
 def number_of_octaves(n_oct: int | str, shape: tuple[int, ...], sigma_min: float) -> int:

@@ -34,7 +34,8 @@ noise of 0.003, 0.01, 0.03, with ratios of 0.54, 0.48, 0.60 (translation), 0.58,
 matches a pair, they help a little: 0.90 and 0.93, and 0.94 with an interval beyond 1 for
 translations. One error per octave helps nowhere and harms some. Dropping low survival helps
 triangulation (0.88 to 0.97), where what is left is better, and harms homographies where much is
-dropped (1.17 at 0.03, 1.61 at 0.07): weights already say what survival does.
+dropped (1.17 at 0.03, 1.61 at 0.07): weights already say what survival does. On ``casamila``, which
+steered nothing, ratios are 0.43 to 0.63, 0.43 to 0.69 and 0.59 to 0.87 at 0.003 to 0.03 (12 pairs).
 """
 
 from __future__ import annotations

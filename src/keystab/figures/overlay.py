@@ -12,7 +12,6 @@ from keystab.errors import InputError
 from keystab.figures import palette
 from keystab.figures.style import NORMAL, context
 from keystab.utils.files import check_writable, written_whole
-from keystab.utils.grey_values import grey_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -172,13 +171,13 @@ def _canvas(crop: NDArray[np.float64], first: tuple[int, int]) -> tuple[Figure, 
         )
     )
     (top, left), (bottom, right) = first, (first[0] + crop.shape[0], first[1] + crop.shape[1])
-    crop = crop / grey_unit(crop)
     low, high = np.quantile(crop, [0.002, 0.998])
+    shown = (crop - low) / max(high - low, np.finfo(np.float64).tiny)
     axes.imshow(
-        crop,
+        np.clip(shown, 0.0, 1.0),
         cmap="gray",
-        vmin=low,
-        vmax=max(high, low + 1e-12),
+        vmin=0.0,
+        vmax=1.0,
         alpha=0.75,
         extent=(left - 0.5, right - 0.5, bottom - 0.5, top - 0.5),
         interpolation="antialiased",
