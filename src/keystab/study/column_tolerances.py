@@ -51,8 +51,8 @@ PLACE = Allowed(absolute=1e-7)
 """Places and scales of single keypoints, pixels: rounding over the second differences, 1e-5, and
 over the conditioning, down to 1e-4, times the step."""
 
-SPREAD = Allowed(absolute=1e-8)
-"""Deviations of places and scales, in the mean or the median over keypoints."""
+SPREAD = Allowed(absolute=1e-9)
+"""Deviations of places and scales, in the mean or the median over a hundred keypoints and more."""
 
 CONDITION = Allowed(relative=1e-7)
 """Condition numbers of single Hessians, up to 1e5, whose largest entry is right to 1e-12."""
