@@ -179,7 +179,7 @@ def test_what_is_searched_for_does_not_depend_on_how_it_is_evaluated(stage):
 
 def test_figures_read_tables_and_nothing_else():
     allowed = {"keystab._version", "keystab.errors", "keystab.utils.files", "keystab.io.tables"}
-    allowed |= {"keystab.io.figure_metadata", "keystab.utils.memory", "keystab.utils.grey_values"}
+    allowed |= {"keystab.io.figure_metadata", "keystab.utils.memory"}
     for name, names in OWN.items():
         if room(name) == "figures":
             assert {other for other in names if room(other) != "figures"} <= allowed, name
