@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scenes import blob, blobs
 
@@ -101,6 +101,7 @@ def test_kernels_are_the_sums_of_their_cosines(n_samples, blur):
 
 
 @settings(max_examples=20, deadline=None)
+@example(first=0.0, second=5e-324, delta=0.5)
 @given(
     first=st.floats(0.0, 4.0), second=st.floats(0.0, 4.0), delta=st.sampled_from([0.5, 0.3, 0.09])
 )

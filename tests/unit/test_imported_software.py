@@ -75,7 +75,9 @@ def test_foreign_packages_before_the_locked_ones_are_named(lock, tmp_path, with_
 def test_every_package_that_the_library_imports_is_compared():
     own = {*sys.stdlib_module_names, "keystab", "mpl_toolkits"}
     found = set()
-    for path in (ROOT / "src/keystab").rglob("*.py"):
+    # Libraries of other detectors run in processes of their own, and have a lock of their own.
+    worker = ROOT / "src/keystab/audit/worker.py"
+    for path in {*(ROOT / "src/keystab").rglob("*.py")} - {worker}:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
                 found |= {alias.name.partition(".")[0] for alias in node.names}

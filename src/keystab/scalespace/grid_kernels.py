@@ -91,7 +91,9 @@ def off_in_kernel(n_samples: int, blur: float, reach: int, n_taps: int) -> float
         return 0.0
     if _in_closed_form(n_samples, blur):
         return 8 * UNIT
-    norm = min(1.0, np.sqrt(1 / (2 * np.sqrt(np.pi) * blur)) + 1 / np.sqrt(2 * n_samples))
+    norm = 1.0
+    if blur > 0.25:
+        norm = min(norm, np.sqrt(1 / (2 * np.sqrt(np.pi) * blur)) + 1 / np.sqrt(2 * n_samples))
     off = 5 * np.log2(2 * n_samples) * norm * np.sqrt(n_taps) * UNIT
     if reach == 0 or reach >= n_samples - 1:  # all of it, or nothing but the identity
         return float(off)
