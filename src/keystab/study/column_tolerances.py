@@ -117,12 +117,6 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     ("uncertainty_.*", "level", SET),
     ("uncertainty_reliability", "predicted_survival", SPREAD),
     ("uncertainty_strata", "middle", Allowed(relative=1e-8, absolute=1e-8)),
-    ("uncertainty_weights", "matches", COUNTED),
-    (
-        "uncertainty_weights",
-        "(error|low|high|ratio|dropping)(_low|_high)?",
-        Allowed(relative=1e-6),  # of least squares that end at a tolerance of 1e-8
-    ),
 )
 """Tables by a regular expression for their names without suffix, columns by ones for theirs, and
 what these may differ by; of several lines for one column the last counts."""
