@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.scalespace.continuous_dog import DogSeries, Jets
+from keystab.scalespace.continuous_dog import BELOW_BLUR, DogSeries, Jets
 
 __all__ = ["annulus", "degeneracy", "persistence", "refined_places", "saddle_distance"]
 
@@ -45,9 +45,6 @@ _LONGEST, _MOST_STEPS = 0.3, 30
 
 #: Newton steps within a slice after each step in scale, and the longest way to follow.
 _SLICE_STEPS, _FOLLOWED = 8, 0.35
-
-#: Scales go this far below the image's own blur (`keystab.truth.true_extrema` does the same).
-_BELOW_BLUR = 0.92
 
 
 def refined_places(detections: pd.DataFrame) -> NDArray[np.float64]:
@@ -159,7 +156,7 @@ def saddle_distance(
     origin = places[owner]
     points = _shifted(origin, starts.reshape(-1, 3))
     found = np.full(len(sign), float(reach))
-    low = _BELOW_BLUR * series.blur
+    low = BELOW_BLUR * series.blur
     for _ in range(_MOST_STEPS):
         inside = (_distance(origin, points) <= 1.5 * reach) & (points[:, 0] >= low)
         owner, origin, points = owner[inside], origin[inside], points[inside]

@@ -27,7 +27,7 @@ point: the units of length of the scale-space itself, which a zoom leaves alone
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -37,14 +37,33 @@ from numpy.typing import NDArray
 
 from keystab.scalespace import cosine_series
 
-__all__ = ["ContinuousDog", "DogSeries", "Jets"]
+__all__ = [
+    "BELOW_BLUR",
+    "FOURTH",
+    "MOST_AMPLIFIED",
+    "ContinuousDog",
+    "DogSeries",
+    "Jets",
+    "jets_of",
+]
+
+BELOW_BLUR = 0.92
+"""Part of an image's own blur below which no scale is looked at: sums may go below that blur, and
+then undo it."""
+
+MOST_AMPLIFIED = 5.0
+"""Samples of an image whose blur is undone may amplify a frequency by e to this power at most."""
 
 #: Entries of the largest array that a block of points needs; bounds the memory to some 100 MB.
 _MOST_ENTRIES = 2**21
 
 #: Pairs of orders of derivatives along y and x that a Hessian needs, through the heat equation.
 _SECOND = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-_FOURTH = (*_SECOND, (3, 0), (1, 2), (2, 1), (0, 3), (4, 0), (2, 2), (0, 4))
+FOURTH = (*_SECOND, (3, 0), (1, 2), (2, 1), (0, 3), (4, 0), (2, 2), (0, 4))
+"""Orders of derivatives along y and x from which all jets follow."""
+
+
+Derivatives = Mapping[tuple[int, int], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -81,6 +100,46 @@ class Jets:
         self.value[rows] = other.value
         self.gradient[rows] = other.gradient
         self.hessian[rows] = other.hessian
+
+
+def jets_of(
+    upper: Derivatives,
+    lower: Derivatives,
+    sigma: NDArray[np.float64],
+    kappa: float,
+    within_slices: bool = False,
+) -> Jets:
+    """Jets of a difference of two Gaussians from the spatial derivatives of each.
+
+    Parameters
+    ----------
+    upper, lower : mapping from (int, int) to ndarray, shape (n,)
+        Derivatives along y and x of the image blurred to kappa sigma and to sigma, of the orders
+        `FOURTH`; of those up to the second, `within_slices`.
+    sigma : ndarray, shape (n,)
+        Scales in pixels.
+    kappa : float
+        Ratio of the two blurs.
+    within_slices : bool
+        Leave out the derivatives along scale, which are then 0.
+    """
+    w = {pair: upper[pair] - lower[pair] for pair in _SECOND}
+    n = sigma.size
+    first, second, along = np.zeros(n), np.zeros(n), np.zeros((n, 2))
+    if not within_slices:
+        for v, weight, ratio in ((upper, 1.0, kappa), (lower, -1.0, 1.0)):
+            s2 = (ratio * sigma) ** 2
+            first += weight * s2 * (v[2, 0] + v[0, 2])
+            second += weight * s2**2 * (v[4, 0] + 2 * v[2, 2] + v[0, 4])
+            along[:, 0] += weight * s2 * (v[3, 0] + v[1, 2])
+            along[:, 1] += weight * s2 * (v[2, 1] + v[0, 3])
+    hessian = np.empty((n, 3, 3))
+    hessian[:, 0, 0] = 2 * first + second
+    hessian[:, 0, 1:] = hessian[:, 1:, 0] = sigma[:, None] * along
+    hessian[:, 1, 1] = sigma**2 * w[2, 0]
+    hessian[:, 2, 2] = sigma**2 * w[0, 2]
+    hessian[:, 1, 2] = hessian[:, 2, 1] = sigma**2 * w[1, 1]
+    return Jets(w[0, 0], np.stack([first, sigma * w[1, 0], sigma * w[0, 1]], axis=1), hessian)
 
 
 class ContinuousDog(Protocol):
@@ -209,30 +268,14 @@ class DogSeries:
         x: NDArray[np.float64],
         within_slices: bool,
     ) -> Jets:
-        w: dict[tuple[int, int], NDArray[np.float64]] = dict.fromkeys(_SECOND, np.zeros(1))
-        first = second = np.zeros(sigma.size)
-        along = np.zeros((sigma.size, 2))
         # Of the two Gaussians the narrower one keeps more frequencies.
         bases = self._bases(y, x, self._counts(float(sigma.min()) ** 2 - self.blur**2))
-        for weight, ratio in ((1.0, self.kappa), (-1.0, 1.0)):
-            s2 = (ratio * sigma) ** 2
-            v = self._derivatives(s2 - self.blur**2, bases, _SECOND if within_slices else _FOURTH)
-            for pair in _SECOND:
-                w[pair] = w[pair] + weight * v[pair]
-            if within_slices:
-                continue
-            first = first + weight * s2 * (v[2, 0] + v[0, 2])
-            second = second + weight * s2**2 * (v[4, 0] + 2 * v[2, 2] + v[0, 4])
-            along[:, 0] += weight * s2 * (v[3, 0] + v[1, 2])
-            along[:, 1] += weight * s2 * (v[2, 1] + v[0, 3])
-        gradient = np.stack([first, sigma * w[1, 0], sigma * w[0, 1]], axis=1)
-        hessian = np.empty((sigma.size, 3, 3))
-        hessian[:, 0, 0] = 2 * first + second
-        hessian[:, 0, 1:] = hessian[:, 1:, 0] = sigma[:, None] * along
-        hessian[:, 1, 1] = sigma**2 * w[2, 0]
-        hessian[:, 2, 2] = sigma**2 * w[0, 2]
-        hessian[:, 1, 2] = hessian[:, 2, 1] = sigma**2 * w[1, 1]
-        return Jets(w[0, 0], gradient, hessian)
+        pairs = _SECOND if within_slices else FOURTH
+        upper, lower = (
+            self._derivatives((ratio * sigma) ** 2 - self.blur**2, bases, pairs)
+            for ratio in (self.kappa, 1.0)
+        )
+        return jets_of(upper, lower, sigma, self.kappa, within_slices)
 
     def _counts(self, variance: float) -> list[int]:
         """Frequencies of both axes that are held and that count after a Gaussian blur."""

@@ -12,7 +12,6 @@ approximated.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -72,40 +71,47 @@ def coefficients(u: ArrayLike) -> NDArray[np.float64]:
 
 
 def sampled(
-    coefs: NDArray[np.float64], shape: tuple[int, int], gains: Sequence[NDArray[np.float64]] = ()
+    coefs: NDArray[np.float64],
+    image: tuple[int, int],
+    shape: tuple[int, int],
+    variance: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Values of a series on a grid of other samples between the same mirrors.
+    """Values of a blurred series on a grid of other samples between the same mirrors.
 
     Parameters
     ----------
     coefs : ndarray, shape (K, L)
-        Leading coefficients of the series of an image of height H and width W.
+        Leading coefficients of the series.
+    image : (int, int)
+        Height H and width W of the image of the series.
     shape : (int, int)
-        Samples m and n along y and along x: sample i lies at ``(i + 1/2) H / m - 1/2``. At least K
-        and L, so that all frequencies are held.
-    gains : two ndarrays, shapes (K,) and (L,), optional
-        Factors of the frequencies of either axis, such as those of a blur.
+        Samples m and n along y and along x: sample i lies at ``(i + 1/2) H / m - 1/2``. Of more
+        frequencies than samples, the highest are left out.
+    variance : float
+        Square of a Gaussian blur in pixels of the image; below 0, blur is undone.
 
     Returns
     -------
     ndarray, shape (m, n)
-        Exact but for rounding; by fast transforms.
+        Exact but for rounding where all frequencies are held; by fast transforms.
 
     Examples
     --------
     >>> a = coefficients([[0.0, 1.0], [2.0, 5.0]])
-    >>> sampled(a, (2, 2)).round(12)
+    >>> sampled(a, (2, 2), (2, 2)).round(12)
     array([[0., 1.],
            [2., 5.]])
-    >>> bool(np.allclose(sampled(a, (4, 2)), evaluate(a, [-0.25, 0.25, 0.75, 1.25], [0, 1])))
+    >>> finer = evaluate(a, [-0.25, 0.25, 0.75, 1.25], [0, 1])
+    >>> bool(np.allclose(sampled(a, (2, 2), (4, 2)), finer))
     True
     """
     from scipy import fft
 
     values: NDArray[np.float64] = np.zeros(shape)
     part = values[: coefs.shape[0], : coefs.shape[1]]
-    part[:] = coefs
-    for axis, gain in enumerate(gains):
+    part[:] = coefs[: shape[0], : shape[1]]
+    for axis, n in enumerate(image):
+        gain = np.exp(-0.5 * variance * (np.pi / n * np.arange(part.shape[axis])) ** 2)
         part *= np.expand_dims(gain, 1 - axis)
     # The transform adds up every cosine twice but for frequency 0.
     part[1:, :] /= 2

@@ -31,7 +31,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from keystab.scalespace import cosine_series
-from keystab.scalespace.continuous_dog import DogSeries, Jets
+from keystab.scalespace.continuous_dog import FOURTH, MOST_AMPLIFIED, DogSeries, Jets, jets_of
 
 __all__ = ["LocalDog"]
 
@@ -45,10 +45,6 @@ _REACH = 8.8
 
 #: Samples per pixel of the first level, where the kernel may be as narrow as the image's own blur.
 _FINEST = 3.0
-
-#: Frequencies may be amplified by e to this power at most, in samples for scales below the image's
-#: own blur.
-_MOST_SHARPENED = 5.0
 
 #: Distance of samples from one level to the next.
 _COARSER = 1.5
@@ -116,7 +112,7 @@ class LocalDog:
         """
         wanted = []
         own = series.blur**2
-        sharpened = series if (own - low**2) * math.pi**2 > _MOST_SHARPENED else None
+        sharpened = series if (own - low**2) * math.pi**2 > MOST_AMPLIFIED else None
         if sharpened:
             low = series.blur
         distance = 1 / _FINEST
@@ -170,7 +166,7 @@ class LocalDog:
                 jets.put(part, series.jets(at[0, part], at[1, part], at[2, part], within_slices))
             return jets
         n = sigma.size
-        moments = np.zeros((2, n, len(_PAIRS)))
+        moments = np.zeros((2, n, len(FOURTH)))
         for number, ratio in enumerate((self.kappa, 1.0)):
             s = ratio * sigma
             which = np.searchsorted([level.least for level in self.levels[1:]], s, side="right")
@@ -188,53 +184,19 @@ class LocalDog:
                     reach,
                     2 if within_slices else 4,
                 )
-        return _jets(moments, sigma, self.kappa, within_slices)
-
-
-#: Orders of derivatives along y and x, in the order of `_sums`.
-_PAIRS = (
-    (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2),
-    (3, 0), (1, 2), (2, 1), (0, 3), (4, 0), (2, 2), (0, 4),
-)  # fmt: skip
+        upper, lower = (dict(zip(FOURTH, each.T, strict=True)) for each in moments)
+        return jets_of(upper, lower, sigma, self.kappa, within_slices)
 
 
 def _level(series: DogSeries, distance: float, variance: float, least: float) -> Level:
     """Samples of a series at about a distance, blurred to a variance."""
     from scipy import fft
 
-    n, shape = (
-        [fft.next_fast_len(math.ceil(m / distance), True) for m in series.shape],
-        series.shape,
-    )
-    held = [min(k, m) for k, m in zip(series.coefficients.shape, n, strict=True)]
-    gains = [
-        np.exp(-0.5 * (variance - series.blur**2) * (np.pi / size * np.arange(k)) ** 2)
-        for size, k in zip(shape, held, strict=True)
-    ]
-    samples = cosine_series.sampled(series.coefficients[: held[0], : held[1]], (n[0], n[1]), gains)
+    shape = series.shape
+    n = [fft.next_fast_len(math.ceil(m / distance), True) for m in shape]
+    more = variance - series.blur**2
+    samples = cosine_series.sampled(series.coefficients, shape, (n[0], n[1]), more)
     return Level(samples, (shape[0] / n[0], shape[1] / n[1]), variance, least)
-
-
-def _jets(moments: Array, sigma: Array, kappa: float, within_slices: bool) -> Jets:
-    """Jets from the derivatives of both Gaussians, see `keystab.scalespace.continuous_dog`."""
-    w = moments[0] - moments[1]
-    n = sigma.size
-    first, second, along = np.zeros(n), np.zeros(n), np.zeros((n, 2))
-    if not within_slices:
-        for v, sign, ratio in ((moments[0], 1.0, kappa), (moments[1], -1.0, 1.0)):
-            s2 = (ratio * sigma) ** 2
-            first += sign * s2 * (v[:, 3] + v[:, 5])
-            second += sign * s2**2 * (v[:, 10] + 2 * v[:, 11] + v[:, 12])
-            along[:, 0] += sign * s2 * (v[:, 6] + v[:, 7])
-            along[:, 1] += sign * s2 * (v[:, 8] + v[:, 9])
-    gradient = np.stack([first, sigma * w[:, 1], sigma * w[:, 2]], axis=1)
-    hessian = np.empty((n, 3, 3))
-    hessian[:, 0, 0] = 2 * first + second
-    hessian[:, 0, 1:] = hessian[:, 1:, 0] = sigma[:, None] * along
-    hessian[:, 1, 1] = sigma**2 * w[:, 3]
-    hessian[:, 2, 2] = sigma**2 * w[:, 5]
-    hessian[:, 1, 2] = hessian[:, 2, 1] = sigma**2 * w[:, 4]
-    return Jets(w[:, 0], gradient, hessian)
 
 
 @njit(cache=True, nogil=True)
@@ -308,7 +270,7 @@ def _three(line, columns, out):
 
 @njit(cache=True, nogil=True)
 def _sums(samples, distance_y, distance_x, y, x, variance, reach, highest):  # noqa: PLR0913
-    """Derivatives of a blurred image at points, shape (n, 13): see `_PAIRS`."""
+    """Derivatives of a blurred image at points, shape (n, 13): see `FOURTH`."""
     height, width = samples.shape
     n = y.size
     out = np.zeros((n, 13))

@@ -14,16 +14,14 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from keystab.scalespace.continuous_dog import ContinuousDog, Jets
+from keystab.scalespace.continuous_dog import BELOW_BLUR, ContinuousDog, Jets
 from keystab.truth.seeds import Seeds
 from keystab.utils.progress import progress_if_watched
 
 __all__ = ["climb", "climbed", "folded", "newton_step", "range_of_climbs"]
 
-#: Climbs may go beyond the range of scales by this factor, and below the image's own blur, where
-#: it cannot be sampled but sums may go.
+#: Climbs may go beyond the range of scales by this factor.
 _CLIMBS_BEYOND = 2**0.4
-_BELOW_BLUR = 0.92
 
 #: Radius of trust in units of (ln sigma, y/sigma, x/sigma): the first, the largest, and the least;
 #: and the one at which a climb that the end of the range holds back is given up.
@@ -80,9 +78,9 @@ def climb(
 
 def range_of_climbs(blur: float, sigma_min: float, sigma_max: float) -> tuple[float, float]:
     """Scales between which climbs go: a factor of 2**0.4 beyond what is reported, but not below
-    0.92 of the blur that the image has.
+    `BELOW_BLUR` of the blur that the image has.
     """
-    return max(sigma_min / _CLIMBS_BEYOND, _BELOW_BLUR * blur), sigma_max * _CLIMBS_BEYOND
+    return max(sigma_min / _CLIMBS_BEYOND, BELOW_BLUR * blur), sigma_max * _CLIMBS_BEYOND
 
 
 def climbed(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from keystab.detection.extrema import discrete_extrema, extrema_of_array
 from keystab.errors import InputError
-from keystab.scalespace.continuous_dog import ContinuousDog, Jets
+from keystab.scalespace.continuous_dog import BELOW_BLUR, MOST_AMPLIFIED, ContinuousDog, Jets
 from keystab.scalespace.dog import ScaleSpace, ranges, scale_space
 from keystab.utils import validation
 
@@ -37,10 +37,6 @@ SEED_SAMPLINGS = (5, 10, 15)
 #: Seeds are sought beyond the range of scales by this factor, so that what lies at its ends is
 #: found.
 SEEDS_BEYOND = 2**0.25
-
-#: And below the image's own blur by these factors at most: undoing blur amplifies frequencies, by e
-#: to half the second number at the highest of them.
-_BELOW_BLUR, _MOST_AMPLIFIED = 0.92, 5.0
 
 
 @dataclass(frozen=True)
@@ -88,8 +84,8 @@ def octave_of(
 
 def range_of_seeds(blur: float, sigma_min: float, sigma_max: float) -> tuple[float, float]:
     """Scales between which seeds are sought, in pixels of an image that has some blur."""
-    sharpest = math.sqrt(max(blur**2 - _MOST_AMPLIFIED / math.pi**2, 0.0))
-    return max(sigma_min / SEEDS_BEYOND, _BELOW_BLUR * blur, sharpest), sigma_max * SEEDS_BEYOND
+    sharpest = math.sqrt(max(blur**2 - MOST_AMPLIFIED / math.pi**2, 0.0))
+    return max(sigma_min / SEEDS_BEYOND, BELOW_BLUR * blur, sharpest), sigma_max * SEEDS_BEYOND
 
 
 def seeds_of(space: ScaleSpace, threads: int = 1) -> Seeds:

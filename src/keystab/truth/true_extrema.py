@@ -183,11 +183,9 @@ def _seeds(
     blur = min(coefs.blur, low)
     # Sampled twice as finely, the series is as good as its spline, whose search is a local one; and
     # where seeds are sought below the image's own blur, with that blur undone.
-    gains = [
-        np.exp((coefs.blur**2 - blur**2) / 2 * (np.pi / n * np.arange(n)) ** 2) for n in coefs.shape
-    ]
     height, width = coefs.shape
-    finer = sampled(coefs.coefficients, (_FINER * height, _FINER * width), gains)
+    shape, more = (_FINER * height, _FINER * width), blur**2 - coefs.blur**2
+    finer = sampled(coefs.coefficients, coefs.shape, shape, more)
     # The grid of a scale-space is mirrored at its first and last samples; the picture, half a pixel
     # beyond. A rim of its mirror image keeps the one away from the other.
     rim = math.ceil(_RIM * coefs.kappa * high)
