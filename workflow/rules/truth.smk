@@ -280,6 +280,7 @@ rule calibrate_bars:
         f"{LOG}calibrate_bars.log",
     benchmark:
         f"{BENCHMARK}calibrate_bars.tsv"
+    priority: 1  # the study's longest job: begun last, it would be waited for
     resources:
         runtime=growing(job_resources.minutes_of_shots),
     params:

@@ -57,6 +57,9 @@ SPREAD = Allowed(absolute=1e-9)
 CONDITION = Allowed(relative=1e-7)
 """Condition numbers of single Hessians, up to 1e5, whose largest entry is right to 1e-12."""
 
+WEIGHED = Allowed(relative=1e-6)
+"""Medians of solutions of iterated, robust least squares, stopped at changes of 1e-8."""
+
 LEARNT = Allowed(absolute=1e-6)
 """Scores of models that were fitted to many keypoints until their gradient was nearly zero."""
 
@@ -117,6 +120,8 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     ("uncertainty_.*", "level", SET),
     ("uncertainty_reliability", "predicted_survival", SPREAD),
     ("uncertainty_strata", "middle", Allowed(relative=1e-8, absolute=1e-8)),
+    ("uncertainty_weights", "noise matches", COUNTED),
+    ("uncertainty_weights", "(error|ratio|dropping)(_low|_high)?", WEIGHED),
 )
 """Tables by a regular expression for their names without suffix, columns by ones for theirs, and
 what these may differ by; of several lines for one column the last counts."""
