@@ -178,3 +178,29 @@ def test_nodes_lie_further_apart_where_samples_are_finer():
     distance = [node_distance(scale_space(image, 1.1, n)) for n in (3, 5, 9, 15, 19)]
     assert distance == sorted(distance) and distance[0] == 1 and distance[-1] > 3
     assert node_distance(scale_space(image[:9, :9], 1.1, 15)) == 1
+
+
+def test_under_noise_nodes_move_together_where_little_else_is_left_over(monkeypatch):
+    # In coarser octaves blur averages noise, which the bounds do not know.
+    monkeypatch.setattr(search_lattice, "_FEW", 0.0)
+    noise = 0.5 + 0.15 * np.random.default_rng(4).standard_normal((96, 120))
+    for image, closer in ((blobs((96, 120), 5), False), (noise, True)):
+        space = scale_space(image, 0.8, 11, sigma_min=2.2)
+        search = LatticeSearch(space, space.rounding, extrema.inner_window(space))
+        assert (search.p < node_distance(space)) is closer
+        assert extrema.discrete_extrema(space).tolist() == of_all(space, space.rounding).tolist()
+
+
+def test_what_is_left_over_is_searched_by_all_its_samples(monkeypatch):
+    # Noise in a corner alone: the part in the middle does not know of it.
+    monkeypatch.setattr(search_lattice, "_FEW", 0.0)
+    image = blobs((150, 170), 5)
+    image[:40, :60] += 0.15 * np.random.default_rng(4).standard_normal((40, 60))
+    space = scale_space(image, 0.8, 11, sigma_min=2.2)
+    search = LatticeSearch(space, space.rounding, extrema.inner_window(space))
+    assert search.p == node_distance(space) > 1
+    regions = [region for part in search.parts for region in search.candidates(part)[1]]
+    assert regions
+    again = search.closer(*regions[0])
+    assert again is not None and again.p == 1 and again.closer(*regions[0]) is None
+    assert of_few(space, space.rounding).tolist() == of_all(space, space.rounding).tolist()

@@ -196,8 +196,14 @@ def _searches(
 def _found_by(search: LatticeSearch | BandLimitedSearch, part: Any) -> np.ndarray:
     """Candidates of one part, from few samples and a bound on what lies between."""
     candidates, undecided = search.candidates(part)
-    dense = [_of_region(search.space, search.tolerance, *region) for region in undecided]
-    return np.concatenate([candidates, *dense])
+    rest = []
+    for rows, columns in undecided:
+        closer = search.closer(rows, columns)
+        if closer is None:
+            rest.append(_of_region(search.space, search.tolerance, rows, columns))
+        else:
+            rest += [_found_by(closer, again) for again in closer.parts]
+    return np.concatenate([candidates, *rest])
 
 
 def _of_region(space: ScaleSpace, tolerance: float, rows: slice, columns: slice) -> np.ndarray:

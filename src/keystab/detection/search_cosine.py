@@ -176,6 +176,9 @@ class BandLimitedSearch:
         """Columns of blocks."""
         return range(len(self.x_starts))
 
+    def closer(self, rows: slice, columns: slice) -> None:  # noqa: ARG002 - as the other search
+        """All samples of what is left over are evaluated."""
+
     def candidates(self, column: int) -> tuple[NDArray[np.int64], list[tuple[slice, slice]]]:
         """Samples of one column of blocks that may be extrema; see `gathered`."""
         _, lower, upper = self.space.blurs

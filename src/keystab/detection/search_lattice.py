@@ -40,11 +40,15 @@ from keystab.scalespace.spline_axis import SplineAxis
 
 # Samples from one node to the next, where they lie one standard deviation of the finest slice
 # apart, and the power with which they become fewer: measured. Extrema among coarser samples differ
-# more from their neighbours and bear larger bounds, so that nodes may lie further apart.
-_SAMPLES, _POWER = 0.546, -0.83
+# more from their neighbours and bear larger bounds, so that nodes may lie further apart. Where the
+# rule gives less than `_LEAST`, all samples are made: cells of two samples exclude little.
+_SAMPLES, _POWER, _LEAST = 0.546, -0.83, 2.1
 
 # Fewer samples than this are all made: what bounds the others takes some milliseconds.
-_FEW = 4e6
+_FEW = 2e7
+
+# Share of a part that may be left over before nodes are moved closer together.
+_LEFT_OVER = 0.15
 
 # Lower Gaussians with a smaller blur, in distances of nodes, are not expanded at a second look.
 _KINKED = 1.4
@@ -63,11 +67,15 @@ def applies(space: ScaleSpace) -> bool:
 
 def node_distance(space: ScaleSpace) -> int:
     """Samples from one node to the next."""
-    p = round(_SAMPLES * (space.sampling.step / float(space.sigma.min())) ** _POWER)
-    if np.prod(space.shape, dtype=float) < _FEW:
+    p = _SAMPLES * (space.sampling.step / float(space.sigma.min())) ** _POWER
+    if p < _LEAST or np.prod(space.shape, dtype=float) < _FEW:
         return 1
     fit = min(space.shape[1:]) // (2 * MARGIN + 2)
-    return int(max(1, min(p, fit)))
+    return int(max(1, min(round(p), fit)))
+
+
+Found = tuple[NDArray[np.int64], list[tuple[slice, slice]]]
+"""Candidates, shape (n, 4), and regions of which nothing is known."""
 
 
 class LatticeSearch:
@@ -84,7 +92,9 @@ class LatticeSearch:
     threads : int
         Parts that are searched at once.
     p : int, optional
-        Samples from one node to the next.
+        Samples from one node to the next; by default as many as leave little over in a part in the
+        middle. Noise makes bounds large, the more so the coarser the octave: they know how the
+        image varies, and not that blur averages it.
     """
 
     @staticmethod
@@ -106,7 +116,20 @@ class LatticeSearch:
         p: int | None = None,
     ) -> None:
         self.space, self.tolerance = space, tolerance
-        p = self.p = p or node_distance(space)
+        self._set_up(p or node_distance(space), window, threads)
+        self._tried: dict[tuple[int, int, int], Found] = {}
+        while p is None and self.p > 1 and self.parts:
+            part = self.parts[len(self.parts) // 2]
+            found = self.candidates(part)
+            cells = sum(columns.stop - columns.start - 1 for _, columns in found[1]) / self.p
+            if cells <= _LEFT_OVER * part[2]:
+                self._tried[part] = found
+                break
+            self._set_up(self.p - 1 if cells < part[2] / 2 else self.p // 2, window, threads)
+
+    def _set_up(self, p: int, window: tuple[slice, slice], threads: int) -> None:
+        """Make what all parts need, for nodes `p` samples apart."""
+        space, self.p = self.space, p
         # Samples on a line between cells belong to both; blocks and groups are kept together.
         first, n_cells = [], []
         for asked in window:
@@ -150,9 +173,7 @@ class LatticeSearch:
             )
             self.bounds = SplineBounds(space, (y_axis, x_axis), p, (many[0], many[1]), n_kinked)
 
-    def candidates(
-        self, part: tuple[int, int, int]
-    ) -> tuple[NDArray[np.int64], list[tuple[slice, slice]]]:
+    def candidates(self, part: tuple[int, int, int]) -> Found:
         """Samples of a part that may be extrema, and rows and columns to be evaluated.
 
         Returns
@@ -162,6 +183,8 @@ class LatticeSearch:
         dense : list of (slice, slice)
             Samples among which all are candidates.
         """
+        if part in self._tried:
+            return self._tried.pop(part)
         space, p = self.space, self.p
         blurs, lower, upper = space.blurs
         top, left, n_cells = part
@@ -211,10 +234,32 @@ class LatticeSearch:
         candidates = np.zeros((count, 4), dtype=np.int64)
         candidates[:, :3] = found[:count]
         regions = [
-            (slice(row, row + p * CELLS + 1), slice(x, x + p * TILE + 1))
-            for x in (column + p * TILE * np.flatnonzero(dense)).tolist()
+            (slice(row, row + p * CELLS + 1), slice(column + p * x, column + p * end + 1))
+            for x, end in _runs(dense)
         ]
         return candidates, regions
+
+    def closer(self, rows: slice, columns: slice) -> LatticeSearch | None:
+        """Search of a region that was left over, by all its samples; None where they are known."""
+        if self.p == 1:
+            return None
+        inner = [
+            slice(max(part.start, 1), min(part.stop, n - 1))
+            for part, n in zip((rows, columns), self.space.shape[1:], strict=True)
+        ]
+        return LatticeSearch(self.space, self.tolerance, (inner[0], inner[1]), p=1)
+
+
+def _runs(dense: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last cell, plus one, of tiles side by side that are left over.
+
+    Examples
+    --------
+    >>> _runs(np.array([True, True, False, True]))
+    [(0, 128), (192, 256)]
+    """
+    ends = np.flatnonzero(np.diff(dense.astype(np.int8), prepend=0, append=0))
+    return [(TILE * first, TILE * last) for first, last in ends.reshape(-1, 2).tolist()]
 
 
 @lru_cache(maxsize=64)
