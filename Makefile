@@ -64,7 +64,7 @@ why: environment ## What would run, why, and for how long (TARGET=figures/fig5.p
 	@python tools/why.py $(if $(TARGET),'$(subst ','\'',$(TARGET))') $(OVERLAY)
 
 test: environment ## All tests
-	pytest -n 2 --dist loadfile -m "not slow"
+	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 test-slow: environment ## The tests that take minutes: twenty kills of the draft, a cluster
 	pytest -m slow
