@@ -31,6 +31,7 @@ _HOME = {
     "from_lafs": "io.keypoint_conventions",
     "from_opencv": "io.keypoint_conventions",
     "keypoint_uncertainty": "prediction.uncertainty",
+    "make_scene": "camera.made_scenes",
     "minimum_unique_set": "matching.unique_keypoints",
     "occurrence": "matching.unique_keypoints",
     "open_scale_space": "io.scale_space_store",

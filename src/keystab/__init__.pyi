@@ -2,6 +2,7 @@
 
 from keystab._version import __version__ as __version__
 from keystab.camera.edge_blur import edge_blur as edge_blur
+from keystab.camera.made_scenes import make_scene as make_scene
 from keystab.camera.psf_fit import fit_psf as fit_psf
 from keystab.camera.simulation import simulate_view as simulate_view
 from keystab.detection.detector import detect_keypoints as detect_keypoints

@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from keystab.camera.made_scenes import make_scene
 from keystab.camera.simulation import Scene, simulate, simulate_view
 from keystab.camera.views import ViewSpec, to_reference, to_view
 from keystab.errors import InputError
@@ -64,7 +65,6 @@ SPAN = 1.7
 
 _SIZES, _APART = (1.6, 2.8, 5.0), 7.0
 _GREY, _HEIGHT = 0.2, 0.6
-_RADII = (3.0, 200.0)
 _GOLDEN = 1.32471795724474602596  # the plastic number: its powers spread points evenly
 
 
@@ -255,7 +255,7 @@ def stage_of(
 
 
 def made_picture(height: int = 800, width: int = 1360) -> NDArray[np.float64]:
-    """Picture for whoever has none at hand: discs of all sizes that hide one another.
+    """Picture for whoever has none at hand: dead leaves, the same wherever it is made.
 
     Parameters
     ----------
@@ -265,30 +265,14 @@ def made_picture(height: int = 800, width: int = 1360) -> NDArray[np.float64]:
     Returns
     -------
     ndarray of float64, shape (height, width)
-        Grey values in [0, 1]. The same wherever it is made.
-
-    Notes
-    -----
-    The density of the radii falls with their third power, as it must for a picture that looks alike
-    from near and far. Edges are not smoothed: views blur them.
+        Grey values in [0, 1]; see `keystab.make_scene`.
 
     Examples
     --------
     >>> made_picture(20, 30).shape
     (20, 30)
     """
-    draw = np.random.default_rng(1511)
-    picture = np.full((height, width), 0.5)
-    n = int(height * width / 60)
-    radius = _RADII[0] / np.sqrt(1 - draw.random(n) * (1 - (_RADII[0] / _RADII[1]) ** 2))
-    centres = draw.random((n, 2)) * (height, width)
-    rows, columns = np.arange(height)[:, None], np.arange(width)[None, :]
-    for (y, x), r, grey in zip(centres, radius, draw.uniform(0.05, 0.95, n), strict=True):
-        down = slice(max(0, math.ceil(y - r)), math.floor(y + r) + 1)
-        across = slice(max(0, math.ceil(x - r)), math.floor(x + r) + 1)
-        inside = (rows[down] - y) ** 2 + (columns[:, across] - x) ** 2 <= r**2
-        picture[down, across][inside] = grey
-    return picture
+    return make_scene("dead-leaves", (height, width), 1511)
 
 
 def views_of(condition: str, plan: AuditPlan) -> list[ViewSpec]:

@@ -82,7 +82,7 @@ def _scene(args: argparse.Namespace, plan: AuditPlan) -> tuple[Stage, str]:
     from keystab.io.pictures import read_picture
 
     if args.scene is None:
-        return stage_of(scene_of(made_picture(), plan), args.threads), "a made scene of discs"
+        return stage_of(scene_of(made_picture(), plan), args.threads), "a made scene of dead leaves"
     picture = read_picture(args.scene)
     try:
         return stage_of(scene_of(picture, plan), args.threads), str(args.scene)

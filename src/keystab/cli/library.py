@@ -47,6 +47,23 @@ def simulate(args: argparse.Namespace) -> None:
     )
 
 
+def scene(args: argparse.Namespace) -> None:
+    """Make a scene and write it."""
+    import keystab
+    from keystab.io.pictures import FORMATS, write_picture
+    from keystab.utils.files import check_writable
+
+    check_writable(args.output, FORMATS)
+    height, width = args.shape
+    made = keystab.make_scene(
+        args.kind, (height, width), args.seed, exponent=args.exponent, angle=args.angle
+    )
+    write_picture(made, args.output)
+    print(
+        f"{args.output}: {height} x {width} pixels, {args.kind}, seed {args.seed}", file=sys.stderr
+    )
+
+
 def detect(args: argparse.Namespace) -> None:
     """Detect the keypoints of a picture and write them as a table."""
     import keystab

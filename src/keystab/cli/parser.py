@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
 from keystab._version import __version__
 from keystab.cli.audit import audit
-from keystab.cli.library import blur, detect, inspect, simulate, truth, uncertainty
-from keystab.cli.study import archive, reference, verify, whence
+from keystab.cli.library import blur, detect, inspect, scene, simulate, truth, uncertainty
+from keystab.cli.study_parser import add_study_commands
 
 BAD_INPUT = 2
 _PICTURE = "PNG, TIFF, JPEG, PNM or npy; turned upright as its EXIF orientation asks"
@@ -40,6 +39,15 @@ def build_parser() -> argparse.ArgumentParser:
             description="Blur a picture and sample it, as a camera that sees it would: exactly, "
             "at any zoom, shift and rotation. The view is centred on the picture, which goes on "
             "beyond its border as its mirror image.",
+        )
+    )
+    _scene_arguments(
+        commands.add_parser(
+            "scene",
+            help="make a scene: leaves, a random field, edges, strokes or text",
+            description="Make a picture of a kind whose properties are known, to be seen by a "
+            "simulated camera or studied as any photograph. The same seed gives the same pixels.",
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
         )
     )
     _detect_arguments(
@@ -99,64 +107,8 @@ def build_parser() -> argparse.ArgumentParser:
         "path", metavar="PATH", type=Path, help="picture, store, .csv or .parquet table"
     )
     to.set_defaults(run=inspect)
-    _study_commands(commands.add_parser)
+    add_study_commands(commands.add_parser)
     return parser
-
-
-def _study_commands(add_parser: Callable[..., argparse.ArgumentParser]) -> None:
-    """Add the commands that are about the study; they are given in the project's folder."""
-    to = add_parser(
-        "whence",
-        help="say where a figure of the study comes from",
-        description="Say what drew a figure, from which tables, what these were made from, and how "
-        "to make it again; and whether files and code are still the same here.",
-    )
-    to.add_argument("figure", metavar="FIGURE", type=Path, help="figure of the study, PDF or PNG")
-    to.set_defaults(run=whence)
-    to = add_parser(
-        "archive",
-        help="pack a finished run of the study into one file",
-        description="Write {results}/archive/keystab-VERSION.zip: figures, tables, verdicts, code, "
-        "settings, environment.lock, Snakemake's records, costs and an RO-Crate.",
-    )
-    _configfile_argument(to)
-    to.set_defaults(run=archive)
-    to = add_parser(
-        "reference",
-        help="copy the small results of a finished run to results/reference",
-        description="Copy tables, verdicts and PNG figures, with their digests and what they were "
-        "made by, to results/reference, to be committed.",
-    )
-    _configfile_argument(to)
-    to.set_defaults(run=reference)
-    to = add_parser(
-        "verify",
-        help="check an archive of the study, or the results that are here",
-        description="Check an archive against the code, settings and lock file here, without "
-        "computing anything; without an archive, the results that are here, and compare them with "
-        "results/reference. With --recompute, compute figures again and compare all numbers.",
-    )
-    to.add_argument("archive", metavar="ARCHIVE", type=Path, nargs="?", help="zip file to check")
-    _configfile_argument(to)
-    to.add_argument(
-        "--recompute", nargs="+", metavar="FIGURE",
-        help="figures to compute again, such as fig5, or all; needs the time and disk of the study",
-    )  # fmt: skip
-    to.add_argument("--cores", type=int, default=1, metavar="N", help="jobs at a time (default 1)")
-    for name, what in (("rtol", "relative"), ("atol", "absolute")):
-        to.add_argument(
-            f"--{name}", type=float, metavar="T",
-            help=f"{what} tolerance for all recomputed numbers where software or processor differ, "
-            "instead of that of each column; where both are the same, every bit counts",
-        )  # fmt: skip
-    to.set_defaults(run=verify)
-
-
-def _configfile_argument(to: argparse.ArgumentParser) -> None:
-    to.add_argument(
-        "--configfile", nargs="+", default=[], metavar="FILE",
-        help="settings of the run, laid over config/config.yaml as for snakemake",
-    )  # fmt: skip
 
 
 def _simulate_arguments(to: argparse.ArgumentParser) -> None:
@@ -193,6 +145,28 @@ def _simulate_arguments(to: argparse.ArgumentParser) -> None:
     to.add_argument(
         "--seed", type=_seed, help="number or word that decides the noise; needed with --noise"
     )
+
+
+def _scene_arguments(to: argparse.ArgumentParser) -> None:
+    to.set_defaults(run=scene)
+    to.add_argument("kind", metavar="KIND", help="dead-leaves, fractal, edges, line-art or text")
+    to.add_argument(
+        "-o", "--output", metavar="OUT", type=Path, required=True,
+        help="picture to write: .png (16 bits), .tiff (float32) or .npy (float64)",
+    )  # fmt: skip
+    to.add_argument(
+        "--shape", type=int, nargs=2, metavar=("H", "W"), default=(1600, 2400),
+        help="height and width in pixels",
+    )  # fmt: skip
+    to.add_argument("--seed", type=int, default=0, metavar="N", help="which one")
+    to.add_argument(
+        "--exponent", type=float, default=2.4, metavar="E",
+        help="of fractal: how fast the power spectrum falls, 0 to 4",
+    )  # fmt: skip
+    to.add_argument(
+        "--angle", type=float, default=0.0, metavar="DEG",
+        help="of edges and line-art: direction of their sides, 0 to 90 degrees from the rows",
+    )  # fmt: skip
 
 
 def _detect_arguments(to: argparse.ArgumentParser) -> None:
@@ -376,7 +350,7 @@ def _audit_arguments(to: argparse.ArgumentParser) -> None:
     )
     to.add_argument(
         "--scene", metavar="PICTURE", type=Path,
-        help=f"what views show: {_PICTURE}; a made scene if not given",
+        help=f"what views show: {_PICTURE}; dead leaves if not given",
     )  # fmt: skip
     to.add_argument("--quick", action="store_true", help="fewer and smaller views")
     to.add_argument(
@@ -394,7 +368,9 @@ def _audit_arguments(to: argparse.ArgumentParser) -> None:
         "--time-limit", type=_seconds, default=20.0, metavar="S",
         help="seconds that a detector may take for a picture (default 20)",
     )  # fmt: skip
-    to.add_argument("--threads", type=int, default=1, metavar="N", help="threads of the truth")
+    to.add_argument(
+        "--threads", type=int, default=2, metavar="N", help="threads of the truth (default 2)"
+    )
 
 
 def _seconds(text: str) -> float:
