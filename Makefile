@@ -33,7 +33,7 @@ NO_WITH = $(if $(WITH),$(error drafts are of the default picture; for one of you
     of their own in $(WITH) and type: make study WITH="config/quick.yaml $(WITH)"))
 
 .DEFAULT_GOAL := help
-.PHONY: help study quick report audit archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
+.PHONY: help study quick report audit scenes archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
 
 help: ## List the targets
 	@echo "make study                  the whole study"
@@ -59,6 +59,9 @@ report: study ## One HTML file with figures, verdicts, costs and provenance, aft
 
 audit: environment .venv-audit/.stamp ## Hold detectors of others against what is there, outside of the study
 	$(SNAKEMAKE) '$(AUDITED)' $(OVERLAY)
+
+scenes: environment ## The claims on 33 scenes, which takes hours (SCENES="lake text_1": on some)
+	$(NO_CORES)python tools/scenes.py $(SCENES) -- $(EXECUTOR) $(OVERLAY)
 
 why: environment ## What would run, why, and for how long (TARGET=figures/fig5.pdf: for one file)
 	@python tools/why.py $(if $(TARGET),'$(subst ','\'',$(TARGET))') $(OVERLAY)

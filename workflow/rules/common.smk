@@ -17,7 +17,15 @@ import yaml
 from keystab import parameters
 from keystab.errors import InputError
 from keystab.provenance import code_digest, imported_software
-from keystab.study import claims_by_scene, feasibility, job_resources, plan, scenes, settings
+from keystab.study import (
+    claims_by_scene,
+    corpus,
+    feasibility,
+    job_resources,
+    plan,
+    scenes,
+    settings,
+)
 from keystab.study.claims import read_claims, table_names
 from keystab.study.rule_parameters import Rules
 
@@ -38,13 +46,14 @@ try:
     )
     feasibility.require(config)
     CLAIMS = read_claims(Path(workflow.basedir, "config/claims.yaml"))
+    CORPUS = corpus.read_corpus(Path(workflow.basedir, "config/scenes.csv"))
     CLAIMED = [f"{name}.csv" for name in table_names(CLAIMS)]
 except InputError as problems:
     sys.exit(str(problems))
 
 # A further scene is the same study of another picture: the wildcard {place} in the paths below is
-# empty for the default scene, and scenes/NAME/ for one of predictors.pictures.
-SCENES = scenes.by_place(config)
+# empty for the default scene, and scenes/NAME/ for one of predictors.pictures or of config/scenes.csv.
+SCENES = scenes.by_place(config, corpus=CORPUS.values())
 STUDY = SCENES[""]
 RESULTS = config["results"]
 HERE = f"{RESULTS}/{{place}}"

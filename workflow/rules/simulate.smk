@@ -1,10 +1,34 @@
 """The simulated camera (section 4 of the paper).
 
-Comes in: the picture of a scene. Goes out: one store per set of views, views/{set}, with a file of
+Comes in: the picture of a scene, or what it is made of. Goes out: one store per set of views, views/{set}, with a file of
 checksums beside it, and tables of what figures 2 and 12 show of views. Steps: check the picture's
 pixels; blur and sample the picture for every view of the set; write the store; list its checksums;
 write pixels as numbers.
 """
+
+
+rule make_scene:
+    """Make a scene of the corpus that is no photograph."""
+    output:
+        picture=f"{RESULTS}/scenes/{{name}}/scene.png",
+    log:
+        f"{config['logs']}/scenes/{{name}}/make_scene.log",
+    benchmark:
+        f"{config['logs']}/benchmarks/scenes/{{name}}/make_scene.tsv"
+    wildcard_constraints:
+        name="|".join(name for name, scene in CORPUS.items() if not scene.path),
+    params:
+        **stage(
+            "make_scene",
+            kind=lambda wildcards: CORPUS[wildcards.name].kind,
+            seed=lambda wildcards: CORPUS[wildcards.name].seed,
+            exponent=lambda wildcards: CORPUS[wildcards.name].exponent,
+            angle=lambda wildcards: CORPUS[wildcards.name].angle,
+        ),
+    message:
+        "Making the scene '{wildcards.name}'"
+    shell:
+        "{params.command} >{log:q} 2>&1"
 
 
 rule simulate:

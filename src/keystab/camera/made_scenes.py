@@ -34,10 +34,13 @@ from keystab.errors import InputError
 from keystab.utils import validation
 from keystab.utils.random import random_generator
 
-__all__ = ["KINDS", "dead_leaves", "fractal_field", "leaf_radii", "make_scene"]
+__all__ = ["KINDS", "SHAPE", "dead_leaves", "fractal_field", "leaf_radii", "make_scene"]
 
 KINDS = ("dead-leaves", "fractal", "edges", "line-art", "text")
 """Kinds of scenes."""
+
+SHAPE = (1600, 2400)
+"""Height and width, if nothing else is said."""
 
 RADII = (5.0, 2000.0)
 """Radii of dead leaves, pixels."""
@@ -56,7 +59,7 @@ Array = NDArray[np.float64]
 
 def make_scene(
     kind: str,
-    shape: tuple[int, int] = (1600, 2400),
+    shape: tuple[int, int] = SHAPE,
     seed: int = 0,
     *,
     exponent: float = 2.4,

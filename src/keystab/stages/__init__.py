@@ -24,6 +24,11 @@ What several stages take
     values : value of each set
 
 Views and scale-spaces
+    kind : kind of scene that is made
+    seed : which one of its kind
+    exponent : how fast the power spectrum of a field falls
+    angle : direction of edges and strokes, degrees
+    picture : picture of the scene
     reference : picture that the simulated camera looks at
     reference_blur : blur that the picture has of itself, its pixels
     dtype : number type in the store
@@ -109,6 +114,9 @@ Claims and results
     claims : file of claims
     tables : tables that claims need
     verdicts : verdicts on each picture, CSV
+    families : family of each scene
+    over_scenes : table of what claims are over scenes
+    numbers : table of the numbers of claims over scenes
     csv : table of verdicts
     json : the same as JSON
     markdown : the same as Markdown

@@ -26,13 +26,19 @@ SECONDS = 15e-6
 MEGABYTES = 600
 """Of Python with its libraries, twice."""
 
-_shape = cache(picture_shape)
+_shape_of_file = cache(picture_shape)
 
 
 def pixels(settings: Settings, name: str) -> tuple[int, int]:
     """Pixels of all views of a set, and of the widest one per row."""
-    shapes = view_shapes(settings["sets"][name], _shape(settings["reference"]))
+    shapes = view_shapes(settings["sets"][name], _shape(settings))
     return sum(height * width for height, width in shapes), max(width for _, width in shapes)
+
+
+def _shape(settings: Settings) -> tuple[int, int]:
+    """Height and width of the scene's picture, which may not have been made yet."""
+    made = settings.get("reference_shape")
+    return made or _shape_of_file(settings["reference"])
 
 
 def _minutes(seconds: float) -> int:
@@ -83,7 +89,7 @@ def minutes_of_shots(settings: Settings) -> int:
 
 def megabytes_of_reference(settings: Settings) -> int:
     """Memory to work on the whole reference: some copies of it."""
-    height, width = _shape(settings["reference"])
+    height, width = _shape(settings)
     return MEGABYTES + math.ceil(10 * 8 * height * width / 1e6)
 
 

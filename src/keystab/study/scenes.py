@@ -1,8 +1,8 @@
 """The scenes of a study, each with settings of its own, and the place of its results.
 
 The default scene is the picture ``reference``; its results lie in the folder ``results``. Further
-ones are the pictures of figure predictors; theirs lie in ``scenes/NAME/`` in that folder. All are
-made by the same rules.
+ones are the pictures of figure predictors, and the corpus (`keystab.study.corpus`); theirs lie in
+``scenes/NAME/`` in that folder. All are made by the same rules.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from keystab.camera.view_sets import assumed_blur, expanded, members, per_view
+from keystab.study.corpus import CorpusScene, with_corpus
 from keystab.study.plan import those_available
 
 Settings = Mapping[str, Any]
 
 
-def by_place(settings: Settings, folder: Path | str = ".") -> dict[str, dict[str, Any]]:
+def by_place(
+    settings: Settings, folder: Path | str = ".", corpus: Iterable[CorpusScene] = ()
+) -> dict[str, dict[str, Any]]:
     """Settings of every scene by the place of its results, which is ``""`` for the default scene.
 
     Parameters
@@ -26,6 +29,8 @@ def by_place(settings: Settings, folder: Path | str = ".") -> dict[str, dict[str
         Complete settings, see `keystab.study.settings.checked`.
     folder : path
         Folder that relative paths in the settings start from.
+    corpus : iterable of CorpusScene
+        Scenes that are studied where they are asked for.
 
     Examples
     --------
@@ -33,9 +38,14 @@ def by_place(settings: Settings, folder: Path | str = ".") -> dict[str, dict[str
     '(scenes/stream/|scenes/roof/)?'
     """
     others = further_pictures(settings, folder)
+    pictures = {name: settings["predictors"]["pictures"][name] for name in others}
+    known = {"own": {"path": settings["reference"]}, **pictures}
+    step = settings["sets"]["still"]["step"]
+    more = with_corpus(known, corpus, settings["results"], step)
+    del more["own"]
     return {
         "": resolved(settings),
-        **{f"scenes/{name}/": resolved(with_scene(settings, name)) for name in others},
+        **{f"scenes/{name}/": resolved(with_picture(settings, it)) for name, it in more.items()},
     }
 
 
@@ -77,13 +87,12 @@ _PLAIN_VIEW = {
 }  # fmt: skip
 
 
-def with_scene(settings: Settings, name: str) -> dict[str, Any]:
+def with_picture(settings: Settings, picture: Mapping[str, Any]) -> dict[str, Any]:
     """Settings of a further scene: the same study of another picture.
 
     Its view ``still`` has the blur of that of the reference and a step of its own, which all sets
     have that share the step of ``still``; no scale-space of it is kept.
     """
-    picture = settings["predictors"]["pictures"][name]
     still = settings["sets"]["still"]
     sets = {
         key: {**views, "step": picture["step"]} if views["step"] == still["step"] else views
@@ -95,6 +104,7 @@ def with_scene(settings: Settings, name: str) -> dict[str, Any]:
         "reference": picture["path"],
         "reference_sha256": picture["sha256"],
         "reference_blur": 0.0,
+        "reference_shape": picture.get("shape"),
         "sets": sets,
         "keep_scale_spaces": False,
     }
