@@ -9,9 +9,12 @@ from scenes import blobs
 
 from keystab.detection.extrema import discrete_extrema, extrema_of_array
 from keystab.detection.single_precision import (
+    SIDES,
+    extrema_in_arithmetic,
     quantised,
     single_precision_extrema,
     single_precision_window,
+    transformed_slices,
 )
 from keystab.errors import InputError
 from keystab.experiments.sampling_stability import floor_summary
@@ -50,6 +53,63 @@ def test_blocks_do_not_show(monkeypatch):
     assert {tuple(row) for row in single_precision_extrema(space, 1e-7)} == {
         tuple(row) for row in expected
     }
+
+
+def test_sums_in_single_precision_are_off_by_more_than_one_rounding():
+    space = scale_space(blobs((40, 50), 1), 1.1, 5)
+    box = (3, 60), (5, 90)
+    exact = space.window(slice(None), *(slice(*part) for part in box))
+    once, sums = (np.abs(single_precision_window(space, *box, sums=how) - exact) for how in (0, 1))
+    assert once.max() < sums.max() < 50 * once.max()
+    # A grey range that is a power of two changes no digit.
+    doubled = single_precision_window(space, *box, grey_range=2.0, sums=True)
+    assert (doubled == 2 * single_precision_window(space, *box, sums=True)).all()
+
+
+@pytest.mark.parametrize("sides", SIDES)
+@pytest.mark.parametrize("n_spo", [5, 6])  # Gaussians of slices are shared or not
+def test_transforms_in_single_precision_are_those_of_double_precision_but_for_rounding(
+    sides, n_spo
+):
+    image = blobs((30, 40), 1)
+    space = scale_space(image, 1.1, n_spo)
+    slices = np.stack(list(transformed_slices(space, sides=sides)))
+    assert slices.dtype == np.float32 and slices.shape == space.shape
+    exact = space.window()
+    # Where the mirror of the longer grid does not reach: 4 standard deviations, and some.
+    reach = [int(n - 8 / space.sampling.delta_min) for n in space.shape[1:]]
+    off = np.abs(slices - exact)[:, : reach[0], : reach[1]]
+    assert 0 < off.max() < 3e-5 * image.max()
+    assert np.median(off) < 1e-6
+
+
+def test_sides_have_the_factors_that_are_asked_for():
+    assert [SIDES["small"](n) for n in (1, 7, 97, 1207)] == [1, 8, 100, 1215]
+    assert [SIDES["large"](n) for n in (2, 8, 1207)] == [2, 11, 1213]
+
+
+@pytest.mark.parametrize("arithmetic", ["float32_sums", "float32_transforms"])
+def test_neighbourhoods_are_those_of_single_precision(arithmetic):
+    space = scale_space(blobs((30, 40), 1), 1.1, 4)
+    found, cubes = extrema_in_arithmetic(space, arithmetic, grey_range=4.0)
+    middle = cubes[:, 1, 1, 1]
+    others = np.delete(cubes.reshape(-1, 27), 13, axis=1)
+    assert len(found) > 10
+    assert ((middle[:, None] - others) * found[:, 3:] > 0).all()
+    exact = space.neighbourhoods(*found[:, :3].T)
+    inner = (found[:, 1] < space.shape[1] - 30) & (found[:, 2] < space.shape[2] - 30)
+    assert np.abs(cubes - exact)[inner].max() < 1e-5
+    assert (np.float32(4 * cubes) == 4 * cubes).all()
+    order = np.lexsort((found[:, 2], found[:, 1], found[:, 0]))
+    assert (np.diff(order) == 1).all()
+
+
+def test_transforms_need_a_spline_and_known_sides():
+    cosine = scale_space(np.ones((12, 12)), 1.1, 3, oversampling="cosine")
+    with pytest.raises(InputError, match="spline"):
+        next(transformed_slices(cosine))
+    with pytest.raises(InputError, match="small or large"):
+        next(transformed_slices(scale_space(np.ones((12, 12)), 1.1, 3), sides="odd"))
 
 
 def test_integers_hold_what_their_bits_can():

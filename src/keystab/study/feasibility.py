@@ -139,6 +139,16 @@ def setting_problems(settings: Settings) -> list[str]:
                 f"floor.variants.{name}.set is {variant['set']}, allowed are sets of views, "
                 f"such as {', '.join(close)}"
             )
+        if variant["arithmetic"] == "float32_transforms" and variant["oversampling"] != "spline":
+            problems.append(
+                f"floor.variants.{name} transforms in single precision with the "
+                f"{variant['oversampling']} series, allowed is oversampling: spline"
+            )
+    problems += [
+        f"floor.pictures.{name} has the name of another picture of predictors.pictures: rename it"
+        for name, picture in settings["predictors"]["pictures"].items()
+        if picture["path"] != settings["floor"]["pictures"].get(name, picture)["path"]
+    ]
     problems += _order(settings["comparison"], "comparison", "unstable_below", "stable_above")
     if settings["comparison"]["last_scale"] is not None:
         problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")
