@@ -20,6 +20,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import threadpoolctl
+from numba import njit
 from numpy.typing import NDArray
 
 from keystab.detection.extrema import Decided, discrete_extrema, extrema_of_array
@@ -73,12 +74,27 @@ def single_precision_window(
             top, first = along.first[blur], across.first[blur]
             box = np.s_[top : top + left.shape[1], first : first + right.shape[1]]
             if whole is not None:
-                left, right = left.astype(np.float32), right.astype(np.float32)
-                gaussians.append(left @ whole[box] @ right.T)
+                across_it = _product(right.astype(np.float32), np.ascontiguousarray(whole[box].T))
+                gaussians.append(
+                    _product(left.astype(np.float32), np.ascontiguousarray(across_it.T))
+                )
                 continue
             blurred = left @ space.source[box] @ right.T
             gaussians.append(((blurred + space.image.mean()) * grey_range).astype(np.float32))
     return np.stack([gaussians[b] - gaussians[a] for a, b in zip(lower, upper, strict=True)])
+
+
+@njit(cache=True, nogil=True)
+def _product(weights, values):
+    """Product of two matrices, each sum in its order, so that it is the same on all machines."""
+    result = np.zeros((weights.shape[0], values.shape[1]), dtype=np.float32)
+    for i in range(weights.shape[0]):
+        for k in range(weights.shape[1]):
+            weight = weights[i, k]
+            if weight != 0:  # rows of a block hold each other's columns
+                for j in range(values.shape[1]):
+                    result[i, j] += weight * values[k, j]
+    return result
 
 
 def single_precision_extrema(
@@ -153,9 +169,9 @@ def transformed_slices(
 ) -> Iterator[NDArray[np.float32]]:
     """Differences of Gaussians in single precision, by cosine transforms of the fine grid.
 
-    The image is rounded to float32; spline coefficients, samples of the fine grid, its transform,
-    the Gaussians' transfer functions, the inverse transforms and their differences are computed
-    in float32.
+    The image and the transfer functions of the Gaussians are rounded to float32; spline
+    coefficients, samples of the fine grid, its transform, the products, the inverse transforms and
+    their differences are computed in float32.
 
     Parameters
     ----------
@@ -191,10 +207,11 @@ def transformed_slices(
     size = tuple(SIDES[sides](n) for n in fine.shape)
     fine = np.pad(fine, [(0, m - n) for n, m in zip(fine.shape, size, strict=True)], "symmetric")
     spectrum = fft.dctn(fine, overwrite_x=True)
-    frequency = [(np.pi / sampling.delta_min / m * np.arange(m)).astype(np.float32) for m in size]
+    frequency = [np.pi / sampling.delta_min / m * np.arange(m) for m in size]
 
     def gaussian(blur: float) -> NDArray[np.float32]:
-        along, across = (np.exp(-0.5 * (np.float32(blur) * f) ** 2) for f in frequency)
+        # Rounded from double precision: exp differs in its last digit between processors.
+        along, across = (np.exp(-0.5 * (blur * f) ** 2).astype(np.float32) for f in frequency)
         # Columns of zeros stay zero: they are not transformed.
         kept = np.flatnonzero(across)[-1] + 1
         part = fft.idct(spectrum[:, :kept] * along[:, None] * across[:kept], axis=0)

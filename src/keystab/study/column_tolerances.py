@@ -99,6 +99,8 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     ("fig(7|8|S1)_precision", "mean median low high", SPREAD),
     ("fig9_keypoints", "y x sigma", PLACE),
     ("fig12_theory", "dog_noise octave_ratio", SOLVED),
+    ("floor_readings", "epsilon limit", SET),
+    ("floor_causes", "rate", COUNTED),
     ("figS2", "error value", SET),
     ("figS2", "scale_shift q25_shift q75_shift", SPREAD),
     ("figS2", "blob_shift dilation_shift", SOLVED),

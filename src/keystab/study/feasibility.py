@@ -144,8 +144,14 @@ def setting_problems(settings: Settings) -> list[str]:
                 f"floor.variants.{name} transforms in single precision with the "
                 f"{variant['oversampling']} series, allowed is oversampling: spline"
             )
+    if not any(one["arithmetic"] == "float64" for one in settings["floor"]["variants"].values()):
+        problems.append(
+            "floor.variants has none in double precision, whose extrema are read in all ways; keep "
+            "one with arithmetic: float64"
+        )
     problems += [
-        f"floor.pictures.{name} has the name of another picture of predictors.pictures: rename it"
+        f"floor.pictures.{name} has the name of another picture, that of predictors.pictures: "
+        "give it a name of its own"
         for name, picture in settings["predictors"]["pictures"].items()
         if picture["path"] != settings["floor"]["pictures"].get(name, picture)["path"]
     ]
