@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from keystab.figures import palette, style
 from keystab.figures._render import Tables, check_tables, main
@@ -34,6 +36,9 @@ TABLES = {
 
 RATE, ALWAYS = (9.0, 11.0), (15.0, 20.0)
 """Per cent: the paper's rates at fine samplings, and its share of keypoints found at all."""
+
+LEAST = 0.8
+"""Per cent: rates are drawn from here on, and smaller ones here."""
 
 DESCRIBED = (
     *("usual", "epsilon_1e7", "epsilon_1e6", "epsilon_1e5", "cosine", "float64_view", "bits_16"),
@@ -92,22 +97,22 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     known = tables["floor_variants"].set_index("variant")["differs_in"].to_dict()
     names = {name: words for name, words in known.items() if _is_described(name)}
     listed = _listed(readings)
-    heights = (0.135 * len(listed) + 0.75, 1.75, 0.128 * len(summary) + 0.7)
+    labels = [_words(row, listed.iloc[0]) for _, row in listed.iterrows()]
+    heights = (0.15 * _places(labels)[1] + 0.75, 1.75, 0.128 * len(summary) + 0.7)
     with style.context():
         figure = style.new_figure(sum(heights))
         rows = figure.add_gridspec(3, 1, height_ratios=heights)
-        first = rows[0].subgridspec(1, 3, width_ratios=(1.25, 1.0, 0.55), wspace=0.03)
+        first = rows[0].subgridspec(1, 3, width_ratios=(1.5, 0.8, 0.5), wspace=0.03)
         _draw_all(figure.add_subplot(first[0]), readings)
-        titles = ("one choice, or enough", "found at all")
+        titles = ("one choice, and enough", "found at all")
         panels = [figure.add_subplot(cell) for cell in (first[1], first[2])]
-        labels = [_words(row, listed.iloc[0]) for _, row in listed.iterrows()]
         _draw_rows(panels, "bc", titles, listed, labels)
         causes = style.panels(rows[1], 1, 2, sharey=True)[0]
         for ax, letter, matching in zip(causes, "de", MATCHING_NAMES, strict=True):
             style.letter(ax, letter, f"why, {MATCHING_NAMES[matching]}")
             _draw_causes(ax, tables["floor_causes"], matching, named=letter == "d")
         causes[0].set_ylabel("lost (%)      new (%)")
-        third = rows[2].subgridspec(1, 3, width_ratios=(1.1, 1.0, 0.55), wspace=0.03)
+        third = rows[2].subgridspec(1, 3, width_ratios=(1.3, 0.8, 0.5), wspace=0.03)
         _draw_rates(figure.add_subplot(third[0]), tables["floor_rates"], names)
         panels = [figure.add_subplot(cell) for cell in (third[1], third[2])]
         labels = [names.get(name, name) for name in summary["variant"]]
@@ -144,7 +149,8 @@ def _words(row: Any, usual: Any) -> str:
         "limit": f"within {row['limit']:g} px",
         "unique_set": f"{row['unique_set']} set",
     }
-    return ", ".join(words[name] for name in CHOICES if row[name] != usual[name]) or "usual"
+    text = ", ".join(words[name] for name in CHOICES if row[name] != usual[name]) or "usual"
+    return textwrap.fill(text, 22)
 
 
 def _tolerance(value: float) -> str:
@@ -176,16 +182,20 @@ def _draw_all(ax: Axes, readings: DataFrame) -> None:
             linewidths=0.8, alpha=0.45 if scale == "soft" else 1.0, label=f"{matching}, {scale}",
         )  # fmt: skip
     style.log_x_axis(ax, max(rate.min(), 0.1), rate.max())
-    style.direct_label(ax, RATE[1], ALWAYS[1], "paper", palette.GREY, up=5.0, right=-2.0)
+    style.direct_label(ax, RATE[0], ALWAYS[0], "paper", palette.GREY, up=-5.0)
     ax.set_ylim(bottom=-2.0)
     ax.set_xlabel("new and lost extrema, mean (%)")
     ax.set_ylabel("keypoints found at all samplings (%)")
+    reach = readings[readings["reaches"]]
+    ax.scatter(
+        rate[reach.index], always[reach.index], s=60.0, facecolors="none",
+        edgecolors=palette.CHANGE_COLOURS["lost"], linewidths=1.0, label="reaches",
+    )  # fmt: skip
     lines = [(_tolerance(each), shades[each]) for each in tolerances]
-    lines += [("round: any, square: one-to-one", palette.INK)]
-    lines += [("open: grid scale, pale: soft range", palette.INK)]
-    lines += [(f"size: limits {limits[0]:g} to {limits[-1]:g} px", palette.INK)]
+    signs = ("round: any", "square: one-to-one", "open: grid scale", "pale: soft range")
+    lines += [(sign, palette.INK) for sign in (*signs, f"size: {limits[0]:g} to {limits[-1]:g} px")]
     for line, (text, colour) in enumerate(lines):
-        ax.text(0.99, 0.985 - 0.052 * line, text, color=colour, transform=ax.transAxes,
+        ax.text(0.99, 0.99 - 0.052 * line, text, color=colour, transform=ax.transAxes,
                 fontsize=style.SMALL, ha="right", va="top")  # fmt: skip
     style.finish_axes(ax)
 
@@ -195,28 +205,19 @@ def _draw_rows(
 ) -> None:
     """Draw new and lost extrema, and keypoints found at all samplings, a line per row."""
     settled, always = panels
-    place = np.arange(len(table))
+    place, end = _places(labels)
     style.letter(settled, letters[0], titles[0])
     style.letter(always, letters[1], titles[1])
     for change, up in (("new", -0.13), ("lost", 0.13)):
         colour = palette.CHANGE_COLOURS[change]
         rate, low, high = (
-            100 * table[f"{change}_{part}"].to_numpy(float) for part in ("rate", "low", "high")
+            np.maximum(100 * table[f"{change}_{part}"].to_numpy(float), LEAST)
+            for part in ("rate", "low", "high")
         )
         settled.hlines(place + up, low, high, color=colour, linewidth=1.0)
         face = colour if change == "new" else "white"
         settled.plot(
             rate, place + up, "o", color=colour, markerfacecolor=face, label=change, markersize=2.8
-        )
-    for line, (change, text) in enumerate((("new", "new (full)"), ("lost", "lost (open)"))):
-        settled.text(
-            1.0,
-            0.62 - line * 0.55 / len(table) * 2,
-            text,
-            transform=settled.transAxes,
-            color=palette.CHANGE_COLOURS[change],
-            fontsize=style.SMALL,
-            ha="right",
         )
     low, high = (100 * table[f"{end}_always"].to_numpy(float) for end in ("low", "high"))
     always.hlines(place, low, high, color=palette.INK, linewidth=1.0)
@@ -226,12 +227,21 @@ def _draw_rows(
     always.set_yticks(place, [])
     for ax, (least, most) in ((settled, RATE), (always, ALWAYS)):
         ax.axvspan(least, most, color=palette.PALE, linewidth=0, zorder=0)
-        ax.set_ylim(len(table) - 0.5, -0.6)
+        ax.set_ylim(end, -0.6)
         style.finish_axes(ax)
-    settled.set_xlim(left=0.0)
-    settled.set_xlabel("extrema (%)")
+    settled.set_xscale("log")
+    settled.set_xticks([1, 10, 100], ["1", "10", "100"])
+    settled.set_xlim(LEAST, 100.0)
+    settled.set_xlabel("new (full), lost (open) (%)")
     always.set_xlim(0.0, 100.0)
     always.set_xlabel("keypoints (%)")
+
+
+def _places(labels: list[str]) -> tuple[NDArray[np.float64], float]:
+    """Place of each row, of which each line of its label takes one, and the end of the last."""
+    lines = np.array([1 + 0.85 * label.count("\n") for label in labels])
+    ends = lines.cumsum() - 0.5
+    return ends - lines / 2, float(ends[-1])
 
 
 def _draw_causes(ax: Axes, causes: DataFrame, matching: str, named: bool) -> None:
@@ -255,7 +265,7 @@ def _draw_causes(ax: Axes, causes: DataFrame, matching: str, named: bool) -> Non
     if named:
         place = {"transform": ax.transAxes, "fontsize": style.SMALL, "va": "center"}
         for line, (cause, name) in enumerate(CAUSE_NAMES.items()):
-            height, left = 0.96 - 0.085 * line, 0.55
+            height, left = 0.96 - 0.085 * (line % 3), 0.36 if line < 3 else 0.70
             colour = palette.CHANGE_CAUSE_COLOURS[cause]
             ax.text(left, height, "\N{BLACK SQUARE}", color=colour, **place)
             ax.text(left + 0.05, height, name, **place)
