@@ -268,11 +268,12 @@ def _of_transforms(space: ScaleSpace, epsilon: float, grey_range: float, sides: 
     validation.number("epsilon", epsilon, least=0)
     validation.number("grey_range", grey_range, above=0)
     found: list[Decided] = []
-    held: list[NDArray[np.float32]] = []
+    three = np.empty((3, *space.shape[1:]), dtype=np.float32)
     for number, values in enumerate(transformed_slices(space, grey_range, sides)):
-        held = [*held[-2:], values]
-        if len(held) == 3:
-            found.append(_with_cubes(np.stack(held), epsilon, (0, 0), number - 2))
+        three[:-1] = three[1:]
+        three[-1] = values
+        if number >= 2:
+            found.append(_with_cubes(three, epsilon, (0, 0), number - 2))
     return _joined(found)
 
 

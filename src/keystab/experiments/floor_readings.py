@@ -235,9 +235,9 @@ def steps_of(
     y, x = (extrema[axis].to_numpy() for axis in ("y", "x"))
     steps = []
     for coarse, fine in itertools.pairwise(samplings):
-        rows = [np.flatnonzero(n_spo == each) for each in (coarse, fine)]
-        a, b, distance = pairs_between(*(extrema.iloc[each] for each in rows), **same)
-        a, b = rows[0][a], rows[1][b]
+        of_a, of_b = (np.flatnonzero(n_spo == each) for each in (coarse, fine))
+        a, b, distance = pairs_between(extrema.iloc[of_a], extrema.iloc[of_b], **same)
+        a, b = of_a[a], of_b[b]
         dy, dx = y[a] - y[b], x[a] - x[b]
         square = dy**2 + dx**2
         scale = distance**2 - square / same["space_tolerance"] ** 2
@@ -377,9 +377,11 @@ def _reached(table: pd.DataFrame) -> dict[str, pd.Series]:
     """Say which of the paper's numbers each row has."""
     rates = table["new_rate"].between(*RATES) & table["lost_rate"].between(*RATES)
     always = table["share_always"].between(*ALWAYS)
-    ends = (("new_low", "new_high", RATES), ("lost_low", "lost_high", RATES))
-    ends += (("low_always", "high_always", ALWAYS),)
-    meets = [(table[a] <= high) & (table[b] >= low) for a, b, (low, high) in ends]
+    ends = (("new_low", "new_high"), ("lost_low", "lost_high"), ("low_always", "high_always"))
+    meets = [
+        (table[a] <= most) & (table[b] >= least)
+        for (a, b), (least, most) in zip(ends, (RATES, RATES, ALWAYS), strict=True)
+    ]
     return {
         "reaches_rates": rates,
         "reaches_always": always,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -94,8 +95,8 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     """
     check_tables(tables, TABLES)
     summary, readings = tables["floor_summary"], _own(tables["floor_readings"])
-    known = tables["floor_variants"].set_index("variant")["differs_in"].to_dict()
-    names = {name: words for name, words in known.items() if _is_described(name)}
+    known = zip(*(tables["floor_variants"][key] for key in ("variant", "differs_in")), strict=True)
+    names = {str(name): str(words) for name, words in known if _is_described(str(name))}
     listed = _listed(readings)
     labels = [_words(row, listed.iloc[0]) for _, row in listed.iterrows()]
     heights = (0.15 * _places(labels)[1] + 0.75, 1.75, 0.128 * len(summary) + 0.7)
@@ -125,7 +126,8 @@ def _own(readings: DataFrame) -> DataFrame:
     """Readings of the first run of the table."""
     first = readings.iloc[0]
     own = (readings["scene"] == first["scene"]) & (readings["variant"] == first["variant"])
-    return readings[own].reset_index(drop=True)
+    rows: DataFrame = readings[own].reset_index(drop=True)
+    return rows
 
 
 def _is_described(name: str) -> bool:
@@ -137,7 +139,8 @@ def _listed(readings: DataFrame) -> DataFrame:
     reach = readings[readings["reaches"]]
     fewest = reach["n_choices"].min()
     shown = (readings["n_choices"] <= 1) | (readings["reaches"] & (readings["n_choices"] == fewest))
-    return readings[shown].sort_values("n_choices", kind="stable")
+    rows: DataFrame = readings[shown].sort_values("n_choices", kind="stable")
+    return rows
 
 
 def _words(row: Any, usual: Any) -> str:
@@ -171,9 +174,10 @@ def _draw_all(ax: Axes, readings: DataFrame) -> None:
     limits = sorted(readings["limit"].unique())
     shades = {each: palette.shade(k / max(len(tolerances) - 1, 1)) for k, each in
               enumerate(tolerances)}  # fmt: skip
-    rate = 50 * (readings["new_rate"] + readings["lost_rate"])
+    rate = np.maximum(50 * (readings["new_rate"] + readings["lost_rate"]), LEAST)
     always = 100 * readings["share_always"]
-    for (matching, scale), rows in readings.groupby(["matching", "range"], sort=False):
+    for matching, scale in itertools.product(MARKERS, readings["range"].unique()):
+        rows = readings[(readings["matching"] == matching) & (readings["range"] == scale)]
         colours = [shades[each] for each in rows["epsilon"]]
         sizes = 5.0 + 6.0 * np.searchsorted(limits, rows["limit"])
         ax.scatter(
@@ -181,7 +185,7 @@ def _draw_all(ax: Axes, readings: DataFrame) -> None:
             facecolors="none" if scale == "grid" else colours, edgecolors=colours,
             linewidths=0.8, alpha=0.45 if scale == "soft" else 1.0, label=f"{matching}, {scale}",
         )  # fmt: skip
-    style.log_x_axis(ax, max(rate.min(), 0.1), rate.max())
+    style.log_x_axis(ax, LEAST, max(float(np.nan_to_num(rate).max()), 20.0))
     style.direct_label(ax, RATE[0], ALWAYS[0], "paper", palette.GREY, up=-5.0)
     ax.set_ylim(bottom=-2.0)
     ax.set_xlabel("new and lost extrema, mean (%)")
@@ -191,7 +195,7 @@ def _draw_all(ax: Axes, readings: DataFrame) -> None:
         rate[reach.index], always[reach.index], s=60.0, facecolors="none",
         edgecolors=palette.CHANGE_COLOURS["lost"], linewidths=1.0, label="reaches",
     )  # fmt: skip
-    lines = [(_tolerance(each), shades[each]) for each in tolerances]
+    lines: list[tuple[str, Any]] = [(_tolerance(each), shades[each]) for each in tolerances]
     signs = ("round: any", "square: one-to-one", "open: grid scale", "pale: soft range")
     lines += [(sign, palette.INK) for sign in (*signs, f"size: {limits[0]:g} to {limits[-1]:g} px")]
     for line, (text, colour) in enumerate(lines):
@@ -265,10 +269,10 @@ def _draw_causes(ax: Axes, causes: DataFrame, matching: str, named: bool) -> Non
     if named:
         place = {"transform": ax.transAxes, "fontsize": style.SMALL, "va": "center"}
         for line, (cause, name) in enumerate(CAUSE_NAMES.items()):
-            height, left = 0.96 - 0.085 * (line % 3), 0.36 if line < 3 else 0.70
+            up, left = 0.96 - 0.085 * (line % 3), 0.36 if line < 3 else 0.70
             colour = palette.CHANGE_CAUSE_COLOURS[cause]
-            ax.text(left, height, "\N{BLACK SQUARE}", color=colour, **place)
-            ax.text(left + 0.05, height, name, **place)
+            ax.text(left, up, "\N{BLACK SQUARE}", color=colour, **place)
+            ax.text(left + 0.05, up, name, **place)
     style.sampling_axis(ax, samplings)
     style.finish_axes(ax)
 

@@ -220,8 +220,8 @@ def one_to_one(
     chosen = [left[:0]]
     while left.size:
         # A pair that comes first among those of both its rows is chosen whatever comes after.
-        firsts = (np.unique(row[left], return_index=True)[1] for row in (row_a, row_b))
-        best = left[np.intersect1d(*firsts)]
+        first_a, first_b = (np.unique(row[left], return_index=True)[1] for row in (row_a, row_b))
+        best = left[np.intersect1d(first_a, first_b)]
         free_a[row_a[best]] = free_b[row_b[best]] = False
         left = left[free_a[row_a[left]] & free_b[row_b[left]]]
         chosen.append(best)

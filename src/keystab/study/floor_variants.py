@@ -126,7 +126,7 @@ _NUMBER_TYPES = {
 }
 
 
-def of_single_precision(settings: Settings, name: str, key: str) -> float:
+def of_single_precision(settings: Settings, name: str, key: str) -> Any:
     """Setting of a variant that single precision alone uses; else one without effect."""
     own = settings["floor"]["variants"][name]
     usual = {"epsilon": 0.0, "grey_range": 1.0, "sides": "small"}[key]
