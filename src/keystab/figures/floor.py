@@ -117,7 +117,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         _draw_rates(figure.add_subplot(third[0]), tables["floor_rates"], names)
         panels = [figure.add_subplot(cell) for cell in (third[1], third[2])]
         labels = [names.get(name, name) for name in summary["variant"]]
-        titles = ("the usual reading, varied", "found at all")
+        titles = ("all variants", "found at all")
         _draw_rows(panels, "gh", titles, summary, labels)
         return style.settle(figure, draft)
 
@@ -185,7 +185,10 @@ def _draw_all(ax: Axes, readings: DataFrame) -> None:
             facecolors="none" if scale == "grid" else colours, edgecolors=colours,
             linewidths=0.8, alpha=0.45 if scale == "soft" else 1.0, label=f"{matching}, {scale}",
         )  # fmt: skip
-    style.log_x_axis(ax, LEAST, max(float(np.nan_to_num(rate).max()), 20.0))
+    ax.set_xscale("log")
+    ticks = (1, 2, 5, 10, 20, 50, 100)
+    ax.set_xticks(ticks, [str(tick) for tick in ticks])
+    ax.set_xlim(0.9 * LEAST, 1.2 * max(float(np.nan_to_num(rate).max()), 20.0))
     style.direct_label(ax, RATE[0], ALWAYS[0], "paper", palette.GREY, up=-5.0)
     ax.set_ylim(bottom=-2.0)
     ax.set_xlabel("new and lost extrema, mean (%)")
