@@ -138,7 +138,7 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("stability: {seen_by: 0.6}", {"match_sweep", "fig11", "fig12"}),
         # The inputs stay the same, but others belong to this variant.
         ("floor: {variants: {closer_1e6: {set: still}}}", VARIANTS),
-        ("floor: {limits: [0.2, 1.0]}", VARIANTS),
+        ("floor: {limits: [0.3, 1.0]}", VARIANTS),
         ("floor: {pictures: {lake: {step: 20}}}", VARIANTS | {"simulate", "detect_variant"}),
         ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "evaluate_views", "truth"}),
         ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),

@@ -24,7 +24,8 @@ CAUSES = ("edge", "second", "merged", "degenerate", "missed", "false")
 - ``edge``: the counterpart is there, beyond the end of the range or in the margin; or the true
   extremum is beyond;
 - ``false``: no true extremum is near, or none of its sign;
-- ``second``: the true extremum stands for a nearer detection of the same sampling;
+- ``second``: the true extremum stands for a nearer detection of the same sampling; or the other
+  sampling found it, and what it found is the counterpart of another one, such as that second one;
 - ``merged``: two true extrema are the same by the limits, and the other sampling found one of them;
 - ``degenerate``: the true extremum is nearly degenerate, a small change may merge it with a saddle;
 - ``missed``: a sound true extremum that the other sampling does not find within the limits.
@@ -44,6 +45,7 @@ class _Truth(NamedTuple):
         partner: NDArray[np.intp],
         near: NDArray[np.bool_],
         beyond: NDArray[np.bool_],
+        taken: NDArray[np.bool_],
         seen: NDArray[np.bool_],
     ) -> NDArray[np.str_]:
         """Cause of each extremum that has no counterpart in a sampling.
@@ -54,6 +56,8 @@ class _Truth(NamedTuple):
             From `keystab.evaluation.recall_precision.partners_and_near`.
         beyond : ndarray of bool
             Whether it has a counterpart where those beyond the range count.
+        taken : ndarray of bool
+            Whether it would have one that is the counterpart of another.
         seen : ndarray of bool
             Which true extrema the other sampling found.
         """
@@ -64,7 +68,7 @@ class _Truth(NamedTuple):
             [
                 beyond | ~self.inside[partner],
                 ~near,
-                partner < 0,
+                (partner < 0) | (taken & seen[partner]),
                 merged[partner],
                 self.degenerate[partner],
             ],
@@ -129,6 +133,7 @@ def causes_of_changes(
     everywhere = np.ones(len(extrema), dtype=bool)
     rows_of_table = []
     for number, step in enumerate(steps_of(extrema, samplings, same)):
+        taken = has_counterpart(step, Reading(limit=same["space_tolerance"]), counted)
         for matching in MATCHINGS:
             reading = Reading(matching, limit=same["space_tolerance"])
             alone = ~has_counterpart(step, reading, counted)
@@ -139,7 +144,9 @@ def causes_of_changes(
             ):
                 own = counted & (n_spo == sampling)
                 changed = np.flatnonzero(own & alone)
-                cause = about.cause(partner[changed], near[changed], beyond[changed], seen[other])
+                cause = about.cause(
+                    partner[changed], near[changed], beyond[changed], taken[changed], seen[other]
+                )
                 for name in CAUSES:
                     k, n = int((cause == name).sum()), int(own.sum())
                     low, high = wilson_interval(k, n)
