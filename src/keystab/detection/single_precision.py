@@ -32,6 +32,9 @@ from keystab.utils import validation
 # Samples a side of the blocks that are searched: all Gaussians of one are held at once.
 _BLOCK = 256
 
+# Transfer functions below this change no digit: it is a billionth of the last one.
+_NOTHING = 1e-16
+
 # Mirrored coefficients on either side, as `spline_rows` counts them.
 _PADDING = 2
 
@@ -212,8 +215,8 @@ def transformed_slices(
     def gaussian(blur: float) -> NDArray[np.float32]:
         # Rounded from double precision: exp differs in its last digit between processors.
         along, across = (np.exp(-0.5 * (blur * f) ** 2).astype(np.float32) for f in frequency)
-        # Columns of zeros stay zero: they are not transformed.
-        kept = np.flatnonzero(across)[-1] + 1
+        # Columns of factors that are below the last digit of any sum are not transformed.
+        kept = np.flatnonzero(across > _NOTHING)[-1] + 1
         part = fft.idct(spectrum[:, :kept] * along[:, None] * across[:kept], axis=0)
         whole = fft.idct(part, n=size[1], axis=1, overwrite_x=True)
         return np.asarray(whole[:n_rows, :n_columns])
