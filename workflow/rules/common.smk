@@ -21,6 +21,7 @@ from keystab.study import (
     claims_by_scene,
     corpus,
     feasibility,
+    floor_variants,
     job_resources,
     plan,
     scenes,

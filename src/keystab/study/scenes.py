@@ -1,8 +1,8 @@
 """The scenes of a study, each with settings of its own, and the place of its results.
 
 The default scene is the picture ``reference``; its results lie in the folder ``results``. Further
-ones are the pictures of figure predictors, and the corpus (`keystab.study.corpus`); theirs lie in
-``scenes/NAME/`` in that folder. All are made by the same rules.
+ones are the pictures of figures predictors and floor, and the corpus (`keystab.study.corpus`);
+theirs lie in ``scenes/NAME/`` in that folder. All are made by the same rules.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ def by_place(
 ) -> dict[str, dict[str, Any]]:
     """Settings of every scene by the place of its results, which is ``""`` for the default scene.
 
+    They say their place themselves, as ``place``.
+
     Parameters
     ----------
     settings : mapping
@@ -37,16 +39,16 @@ def by_place(
     >>> place_pattern({"": {}, "scenes/stream/": {}, "scenes/roof/": {}})
     '(scenes/stream/|scenes/roof/)?'
     """
-    others = further_pictures(settings, folder)
-    pictures = {name: settings["predictors"]["pictures"][name] for name in others}
+    others = dict.fromkeys([*further_pictures(settings, folder), *settings["floor"]["pictures"]])
+    named = {**settings["floor"]["pictures"], **settings["predictors"]["pictures"]}
+    pictures = {name: named[name] for name in others}
     known = {"own": {"path": settings["reference"]}, **pictures}
     step = settings["sets"]["still"]["step"]
     more = with_corpus(known, corpus, settings["results"], step)
     del more["own"]
-    return {
-        "": resolved(settings),
-        **{f"scenes/{name}/": resolved(with_picture(settings, it)) for name, it in more.items()},
-    }
+    found = {"": resolved(settings)}
+    found |= {f"scenes/{name}/": resolved(with_picture(settings, it)) for name, it in more.items()}
+    return {place: {**own, "place": place} for place, own in found.items()}
 
 
 def place_pattern(places: Iterable[str]) -> str:
