@@ -49,7 +49,7 @@ def folder(tmp_path, tables):
 # Embedding fonts takes longer than drawing, and is the same for all: most are written as drafts are.
 # Pixels, a surface, a grid and curves are drawn in different ways; of each one here.
 TWICE = [
-    (2, False),
+    ("S2", False),
     *(pytest.param(n, True, marks=[pytest.mark.slow] * (n not in (3, 6, 12))) for n in NUMBERS),
 ]
 
