@@ -210,14 +210,16 @@ def test_the_report_and_the_figure_have_every_claim_that_was_tested():
     text = to_markdown(found, {"a_first": "All | is well.", "b_second": "Some is."})
     assert "| `a_first` | All \\| is well. | 33 of 33 (0.90 to 1.00) |" in text
     assert "| `b_second` | Some is. | 27 of 33 (0.66 to 0.91) | 9 of 9 |" in text
-    drawn = figure.draw({"claims_over_scenes": found})
+    tables = {"claims_over_scenes": found, "claims_by_family": scene_verdicts.by_family(found)}
+    drawn = figure.draw(tables)
     first, second = (ax for ax in drawn.axes if ax.get_label() in ("a", "b"))
     names = [label.get_text() for ax in (first, second) for label in ax.get_yticklabels()]
     assert names == ["General (1)", "a_first", "Depend on the family (1)", "b_second"]
     squares = [patch.get_facecolor()[:3] for patch in second.patches]
     assert len(squares) == 5 and len(set(squares)) == 2  # of five families, one is different
-    with pytest.raises(InputError, match="no family"):
-        figure.draw({"claims_over_scenes": found.assign(kind="not testable")})
+    untested = {"claims_over_scenes": found.assign(kind="not testable")}
+    with pytest.raises(InputError, match="no claim that a scene could test"):
+        figure.draw(tables | untested)
 
 
 def test_the_tool_names_the_scenes_that_there_are(monkeypatch):

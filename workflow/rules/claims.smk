@@ -60,6 +60,7 @@ rule claims_scenes:
         json=f"{RESULTS}/scenes/claims.json",
         markdown=f"{RESULTS}/scenes/claims.md",
         over_scenes=f"{RESULTS}/scenes/claims_over_scenes.csv",
+        by_family=f"{RESULTS}/scenes/claims_by_family.csv",
         numbers=f"{RESULTS}/scenes/numbers.csv",
     log:
         f"{config['logs']}/claims_scenes.log",
@@ -81,6 +82,7 @@ rule scenes:
     """Figure scenes: which claims hold on all scenes, and which depend on the family."""
     input:
         f"{RESULTS}/scenes/claims_over_scenes.csv",
+        f"{RESULTS}/scenes/claims_by_family.csv",
     output:
         pdf=f"{config['figures']}/scenes.pdf",
         png=f"{config['figures']}/scenes.png",

@@ -17,9 +17,10 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 TABLES = {
-    "claims_over_scenes.csv": ("claim", "kind", "n_scenes", "n_holds", "share", "low", "high"),
+    "claims_over_scenes.csv": ("claim", "kind", "share", "low", "high"),
+    "claims_by_family.csv": ("claim", "family", "n_scenes", "n_holds"),
 }
-"""Files read, with the columns that they must have; and two for every family."""
+"""Files read, with the columns that they must have."""
 
 TITLES = {
     "general": "General",
@@ -57,22 +58,20 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         If a table is unusable.
     """
     check_tables(tables, TABLES)
-    table = tables["claims_over_scenes"]
-    families = [
-        name.removesuffix("_holds")
-        for name in map(str, table)
-        if name.endswith("_holds") and name != "n_holds"
-    ]
+    table, parts = tables["claims_over_scenes"], tables["claims_by_family"]
+    families = list(dict.fromkeys(parts["family"]))
+    holds = parts.set_index(["claim", "family"])[["n_holds", "n_scenes"]]
     lines = _lines(table)
-    if not families or not lines:
-        raise InputError("claims_over_scenes.csv: no family, or no claim that a scene could test")
+    if not lines:
+        raise InputError("claims_over_scenes.csv: no claim that a scene could test")
     high = -(-len(lines) // _COLUMNS)
     with style.context():
         figure = style.new_figure(_HEAD + _ROW * high)
         axes = style.panels(figure.add_gridspec(1, 1)[0], 1, _COLUMNS)[0]
         for number, ax in enumerate(axes):
             style.letter(ax, "ab"[number], _SAID[number])
-            _draw_rows(ax, lines[number * high : (number + 1) * high], high, families)
+            part = lines[number * high : (number + 1) * high]
+            _draw_rows(ax, part, high, families, holds)
         return style.settle(figure, draft)
 
 
@@ -86,7 +85,9 @@ def _lines(table: DataFrame) -> list[_Line]:
     return lines
 
 
-def _draw_rows(ax: Axes, lines: list[_Line], high: int, families: list[str]) -> None:
+def _draw_rows(
+    ax: Axes, lines: list[_Line], high: int, families: list[str], holds: DataFrame
+) -> None:
     n = len(families)
     colours = palette.stability_map()
     ax.set_ylim(high - 0.5, -0.5)
@@ -98,8 +99,8 @@ def _draw_rows(ax: Axes, lines: list[_Line], high: int, families: list[str]) -> 
             label.set_fontweight("bold")
             continue
         for x, family in enumerate(families):
-            tested, holds = (float(line[f"{family}_{what}"]) for what in ("n", "holds"))
-            colour = colours(holds / tested) if tested else "white"
+            held, tested = holds.loc[(line["claim"], family)]
+            colour = colours(held / tested) if tested else "white"
             edge = "white" if tested else palette.GREY
             ax.add_patch(_square(x, at, colour, edge))
         share, low, far = (n + 5.0 * float(line[name]) for name in ("share", "low", "high"))

@@ -119,6 +119,7 @@ Claims and results
     verdicts : verdicts on each picture, CSV
     families : family of each scene
     over_scenes : table of what claims are over scenes
+    by_family : table of on how many scenes of each family they hold
     numbers : table of the numbers of claims over scenes
     csv : table of verdicts
     json : the same as JSON

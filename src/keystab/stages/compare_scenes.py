@@ -15,6 +15,7 @@ def main(
     json: Path,
     markdown: Path,
     over_scenes: Path,
+    by_family: Path,
     numbers: Path,
 ) -> None:
     """Read the verdicts of every scene; write one row per claim and scene, and what they say."""
@@ -30,6 +31,7 @@ def main(
     claims, means = scene_verdicts.over_scenes(table), over_families(table)
     write_table(table, csv)
     write_table(claims, over_scenes)
+    write_table(scene_verdicts.by_family(claims), by_family)
     write_table(means, numbers)
     first = next(iter(reports.values()))
     statements = dict(zip(first["id"], first["statement"], strict=True))

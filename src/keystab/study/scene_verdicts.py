@@ -33,7 +33,7 @@ from keystab.errors import InputError
 from keystab.evaluation.intervals import wilson_interval
 from keystab.study.verdicts import REPRODUCED, UNTESTED
 
-__all__ = ["GENERAL", "KINDS", "families_differ", "holm", "long_table", "over_scenes"]
+__all__ = ["GENERAL", "KINDS", "by_family", "families_differ", "holm", "long_table", "over_scenes"]
 
 GENERAL, GENERALLY_NOT, DEPENDS, UNDECIDED, NOWHERE = (
     "general", "generally not", "scene-dependent", "undecided", "not testable",
@@ -173,6 +173,33 @@ def over_scenes(table: pd.DataFrame) -> pd.DataFrame:
     found["p_families"] = holm(found["p_families"].to_numpy(dtype=np.float64))
     found.insert(1, "kind", [_kind(row) for row in found.to_dict("records")])
     return found
+
+
+def by_family(found: pd.DataFrame) -> pd.DataFrame:
+    """What `over_scenes` says of families, one row for every claim and family.
+
+    Returns
+    -------
+    DataFrame
+        ``claim, family, n_scenes, n_holds``.
+    """
+    families = [
+        str(name).removesuffix("_holds")
+        for name in found
+        if str(name).endswith("_holds") and name != "n_holds"
+    ]
+    parts = [
+        pd.DataFrame(
+            {
+                "claim": found["claim"],
+                "family": family,
+                "n_scenes": found[f"{family}_n"],
+                "n_holds": found[f"{family}_holds"],
+            }
+        )
+        for family in families
+    ]
+    return pd.concat(parts, ignore_index=True)
 
 
 def _kind(row: Mapping[Any, Any]) -> str:
