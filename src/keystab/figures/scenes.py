@@ -34,7 +34,7 @@ _Line = str | dict[Hashable, Any]
 
 _ROW, _HEAD = 0.125, 1.15
 _COLUMNS = 2
-_SAID = ("share of scenes where it holds", "yellow: on all, blue: on none")
+_SAID = ("share of scenes where it holds", "yellow: all, blue: none")
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
