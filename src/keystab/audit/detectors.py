@@ -189,6 +189,12 @@ def own_detector(text: str, convention: Convention = KEYSTAB) -> Detector:
         name = " ".join(word for word in words if "{" not in word) or "command"
         named = Detector(name, "as given", "command", text, convention)
         return replace(named, kappa=None, assumed_blur=None)
+    if " " in text or "/" in text or "{" in text:
+        missing = [place for place in ("{picture}", "{table}") if place not in text]
+        raise InputError(
+            f"the command {text!r} has no {' and no '.join(missing)}; write these where it takes "
+            "the picture that it reads and the CSV that it writes, and the whole in quotes"
+        )
     known = ", ".join(dict.fromkeys(each.name for each in DETECTORS))
     raise InputError(
         f"{text!r} is no detector; give {known}, module:function, or a command in quotes with "

@@ -46,7 +46,10 @@ def page(table: pd.DataFrame, command: str, scene: str, figure: str = "audit.png
         "pixels. *Blobs* are isolated Gaussians at known places, spread over all sub-pixel "
         f"phases; *{PHOTOGRAPH}* are views of the scene, {_camera()}. In brackets stand 95 % "
         "intervals. `audit.csv` has all numbers, `audit_octaves.csv` the same by octave, "
-        "`audit_phases.csv` how errors follow the sub-pixel phase.",
+        "`audit_phases.csv` how errors follow the sub-pixel phase. A convention such as "
+        "`0 yx sigma` says where the centre of the first pixel is, which coordinate comes first "
+        "and what a scale is; *at matched number* means of the strongest keypoints, as many for "
+        "every detector. docs/audit.md of keystab says how to read the rest.",
         f"![Bias, errors, recall and repeatability]({figure})",
         "## Controls",
         "Made of the truth itself: what the measures say where the answer is known.",

@@ -147,7 +147,14 @@ def eight_bits(image: Any) -> Any:
 def own_function(name: str, order: str) -> Callable[..., Columns]:
     """Detector ``module:function``; modules in the folder of work are found too."""
     sys.path.insert(0, os.getcwd())
-    function = pkgutil.resolve_name(name)
+    try:
+        function = pkgutil.resolve_name(name)
+    except ModuleNotFoundError as error:
+        if error.name != name.partition(":")[0].partition(".")[0]:
+            raise
+        raise FileNotFoundError(
+            f"there is no module {error.name} in {os.getcwd()}, nor is one installed"
+        ) from None
     if not callable(function):
         raise TypeError(f"{name} is no function")
     try:

@@ -94,7 +94,7 @@ def build_parser() -> argparse.ArgumentParser:
             "known, and write what they find of these, how far off it is and what two views "
             "share: audit.csv, a figure, and audit.md, which says it in words. Of libraries: "
             "opencv, skimage, vlfeat, colmap, kaze, akaze, kornia, keystab, where they are "
-            "installed (pip install 'keystab[audit]').",
+            "installed; make audit installs all but kornia in .venv-audit (--python).",
         )
     )
     to = commands.add_parser(
@@ -343,7 +343,7 @@ def _audit_arguments(to: argparse.ArgumentParser) -> None:
         help="a library's name; module:function, a function of a grey image in [0, 1] and its "
         "camera blur that returns a table with y, x, sigma, rows of them, or a list of "
         "cv2.KeyPoint; or a command in quotes, \"my_detector {picture} {table}\", that reads a PNG "
-        "and writes a CSV with y, x, sigma in its first line",
+        "and writes a CSV with y, x, sigma in its first line; {camera_blur} may stand in it too",
     )  # fmt: skip
     to.add_argument(
         "-o", "--output", metavar="FOLDER", type=Path, required=True, help="folder to write to"
@@ -366,7 +366,8 @@ def _audit_arguments(to: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     to.add_argument(
         "--time-limit", type=_seconds, default=20.0, metavar="S",
-        help="seconds that a detector may take for a picture (default 20)",
+        help="seconds by the clock that a detector may take for a picture, more on a busy machine "
+        "(default 20)",
     )  # fmt: skip
     to.add_argument(
         "--threads", type=int, default=2, metavar="N", help="threads of the truth (default 2)"

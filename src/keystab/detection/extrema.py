@@ -212,14 +212,12 @@ def _of_region(space: ScaleSpace, tolerance: float, rows: slice, columns: slice)
         (max(part.start - 1, 0), min(part.stop + 1, n))
         for part, n in zip((rows, columns), space.shape[1:], strict=True)
     )
-    found = [np.empty((0, 4), dtype=np.int64)]
     if bottom - top < 3 or right - left < 3:
-        return found[0]
-    for first, last in ranges(top + 1, bottom - 1, BLOCK_ROWS):  # bounds the memory
-        dog = space.window(slice(None), slice(first - 1, last + 1), slice(left, right))
-        least = tolerance - space.rounding_bounds.between
-        found.append(extrema_of_array(dog, least, (first - 1, left)))
-    return np.concatenate(found)
+        return np.empty((0, 4), dtype=np.int64)
+    blocks = list(ranges(top + 1, bottom - 1, BLOCK_ROWS))
+    along = [space.axes[0].block(first - 1, last + 1) for first, last in blocks]
+    parts = ranges(left + 1, right - 1, BLOCK_COLUMNS)
+    return np.concatenate([_evaluated(space, blocks, along, tolerance, part) for part in parts])
 
 
 def _evaluated(

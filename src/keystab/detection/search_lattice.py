@@ -47,6 +47,10 @@ _SAMPLES, _POWER, _LEAST = 0.546, -0.83, 2.1
 # Fewer samples than this are all made: what bounds the others takes some milliseconds.
 _FEW = 2e7
 
+# Tiles between two that are evaluated in full which cost less with them than apart: what a tile
+# sees of the source is some times as wide.
+_BETWEEN = 8
+
 # Share of a part that may be left over before nodes are moved closer together.
 _LEFT_OVER = 0.15
 
@@ -235,7 +239,7 @@ class LatticeSearch:
         candidates[:, :3] = found[:count]
         regions = [
             (slice(row, row + p * CELLS + 1), slice(column + p * x, column + p * end + 1))
-            for x, end in _runs(dense)
+            for x, end in _runs(dense, _BETWEEN if p == 1 else 0)
         ]
         return candidates, regions
 
@@ -250,16 +254,21 @@ class LatticeSearch:
         return LatticeSearch(self.space, self.tolerance, (inner[0], inner[1]), p=1)
 
 
-def _runs(dense: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last cell, plus one, of tiles side by side that are left over.
+def _runs(dense: NDArray[np.bool_], between: int) -> list[tuple[int, int]]:
+    """First and last cell, plus one, of tiles that are left over, with up to so many between them.
 
     Examples
     --------
-    >>> _runs(np.array([True, True, False, True]))
+    >>> _runs(np.array([True, True, False, True]), 0)
     [(0, 128), (192, 256)]
+    >>> _runs(np.array([True, True, False, True]), 1)
+    [(0, 256)]
     """
-    ends = np.flatnonzero(np.diff(dense.astype(np.int8), prepend=0, append=0))
-    return [(TILE * first, TILE * last) for first, last in ends.reshape(-1, 2).tolist()]
+    left = np.flatnonzero(dense)
+    if not left.size:
+        return []
+    parts = np.split(left, np.flatnonzero(np.diff(left) > between + 1) + 1)
+    return [(TILE * int(part[0]), TILE * (int(part[-1]) + 1)) for part in parts]
 
 
 @lru_cache(maxsize=64)
