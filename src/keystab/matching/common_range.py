@@ -17,7 +17,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.camera.common_field import in_common_field, to_common_frame
+from keystab.camera.common_field import (
+    in_common_field,
+    to_common_frame,
+    zoom_to_common_frame,
+)
 from keystab.camera.views import ViewSpec
 
 
@@ -117,10 +121,9 @@ class CommonRange:
         zoom = np.ones(len(table))
         for number, spec in enumerate(self.specs):
             here = view == number
-            y[here], x[here] = to_common_frame(
-                spec, self.specs[0], self.reference_shape, y[here], x[here]
-            )
-            zoom[here] = spec.step / self.specs[0].step
+            where = (spec, self.specs[0], self.reference_shape, y[here], x[here])
+            zoom[here] = zoom_to_common_frame(*where)
+            y[here], x[here] = to_common_frame(*where)
         table = table.assign(y=y, x=x, sigma=table["sigma"] * zoom)
         if scale_column != "sigma":
             table[scale_column] = table[scale_column] * zoom
