@@ -1,7 +1,8 @@
 """What the detections in many views of the scene have in common (sections 5.5 to 6.3).
 
 Comes in: tables of extrema and refinement traces of sets of views. Goes out: tidy tables,
-tables/fig7*.csv to fig12*.csv, figS1*.csv and figS2.csv, that the figures draw. Steps: accept
+tables/fig7*.csv to fig12*.csv, figS1*.csv, figS2.csv, figS5*.csv and those of sweeps that no figure is
+about, that the figures draw. Steps: accept
 refined keypoints; bring them to the frame of the first view; keep the common field of view and range
 of scales; find the minimum set of unique keypoints; look each up in every view; curves, precisions
 and counts with their intervals.
@@ -9,7 +10,7 @@ and counts with their intervals.
 
 
 rule match_views:
-    """Figures 7, 8, S1: stability and precision across translations, zoom-outs, rotations."""
+    """Figures 7, 8, S1, S5: stability and precision across views of the scene."""
     input:
         views=ancient(files("views/{}", plan.sets_of_figure, "{figure}")),
         views_digest=files("views/{}.sha256", plan.sets_of_figure, "{figure}"),
@@ -39,6 +40,7 @@ rule match_views:
             "stability.n_resamples",
             max_offsets=of(plan.further_limits, "{figure}", "max_offsets"),
             iterations=of(plan.further_limits, "{figure}", "max_iterations"),
+            tilts=of(plan.tilts, "{figure}"),
         ),
     message:
         "Matching the keypoints of {wildcards.figure} at n_spo = {params.n_spo}{params.scene}"
@@ -159,6 +161,84 @@ use rule match_aliasing as match_sweep with:
             name=of(plan.swept, "{figure}"),
             values=column("value", plan.searches_of_figure, "{figure}"),
             starts=of(plan.starts_within, "{figure}"),
+        ),
+
+
+rule match_stated:
+    """Keypoints under noise and a wrong blur at once, over five octaves (section 4)."""
+    input:
+        views=ancient(files("views/{set}", plan.searches_of_sweep, "{sweep}")),
+        views_digest=files("views/{set}.sha256", plan.searches_of_sweep, "{sweep}"),
+        extrema=files(
+            "keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"
+        ),
+        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
+    output:
+        curves=f"{HERE}tables/{{sweep}}_curves.csv",
+        counts=f"{HERE}tables/{{sweep}}_counts.csv",
+        scales=f"{HERE}tables/{{sweep}}_octaves.csv",
+    log:
+        f"{LOG}match_stated/{{sweep}}.log",
+    benchmark:
+        f"{BENCHMARK}match_stated/{{sweep}}.tsv"
+    wildcard_constraints:
+        sweep="large_scales",
+    params:
+        **stage(
+            "match_sweep",
+            parameters.ComparedInViews,
+            parameters.Same,
+            parameters.Acceptance,
+            parameters.Octaves,
+            "stability.n_resamples",
+            name=of(plan.stated_key, "{sweep}"),
+            values=column("value", plan.searches_of_sweep, "{sweep}"),
+            starts=of(plan.octaves_of_sweep, "{sweep}"),
+        ),
+    message:
+        "Matching the keypoints of '{wildcards.sweep}' for {params.name} = {params.values}{params.scene}"
+    shell:
+        "{params.command} >{log:q} 2>&1"
+
+
+use rule match_stated as match_blur_zooms with:
+    # Figure S2: keypoints of the first view in those at other zooms, under right and wrong blurs.
+    output:
+        curves=f"{HERE}tables/{{sweep}}_curves.csv",
+        counts=f"{HERE}tables/{{sweep}}_counts.csv",
+        pairs=f"{HERE}tables/{{sweep}}_pairs.csv",
+    wildcard_constraints:
+        sweep="blur_zooms",
+    params:
+        **stage(
+            "match_sweep",
+            parameters.ComparedInViews,
+            parameters.Same,
+            parameters.Acceptance,
+            "stability.n_resamples",
+            name=of(plan.stated_key, "{sweep}"),
+            values=column("value", plan.searches_of_sweep, "{sweep}"),
+        ),
+
+
+use rule match_stated as match_unbalanced with:
+    # How stable interpolation is at balanced and at unbalanced samplings (caption of figure 3).
+    output:
+        curves=f"{HERE}tables/{{sweep}}_curves.csv",
+        counts=f"{HERE}tables/{{sweep}}_counts.csv",
+        interpolation=f"{HERE}tables/{{sweep}}_interpolation.csv",
+    wildcard_constraints:
+        sweep="unbalanced",
+    params:
+        **stage(
+            "match_sweep",
+            parameters.ComparedInViews,
+            parameters.Same,
+            parameters.Acceptance,
+            "stability.n_resamples",
+            name=of(plan.stated_key, "{sweep}"),
+            values=column("value", plan.searches_of_sweep, "{sweep}"),
+            n_spo=column("n_spo", plan.searches_of_sweep, "{sweep}"),
         ),
 
 

@@ -76,6 +76,7 @@ rule count_refined:
         traces=files("keypoints/traces_n{}.parquet", plan.setting, "samplings.n_spo"),
     output:
         table=f"{HERE}tables/refinement.csv",
+        dead=f"{HERE}tables/dead_range.csv",
     log:
         f"{LOG}count_refined.log",
     benchmark:

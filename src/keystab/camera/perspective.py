@@ -126,7 +126,7 @@ def zoom(homography: Homography, down: ArrayLike, right: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> zoom(((2.0, 0, 0), (0, 8.0, 0), (0, 0, 1.0)), 0.0, 0.0).item()
+    >>> round(zoom(((2.0, 0, 0), (0, 8.0, 0), (0, 0, 1.0)), 0.0, 0.0).item(), 9)
     4.0
     """
     depth = homogeneous(homography, down, right)[2]

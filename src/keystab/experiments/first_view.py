@@ -19,7 +19,10 @@ from keystab.matching.correspondence import matched, pairs_between
 
 
 def against_first(
-    keypoints: pd.DataFrame, everywhere: CommonRange, same: Mapping[str, Any]
+    keypoints: pd.DataFrame,
+    everywhere: CommonRange,
+    same: Mapping[str, Any],
+    labels: Mapping[str, Any] | None = None,
 ) -> pd.DataFrame:
     """Compare the keypoints of every view with those of the first.
 
@@ -32,11 +35,13 @@ def against_first(
         counterparts may lie beyond the ends of the range of scales.
     same : mapping
         Options of `keystab.matching.correspondence.same`.
+    labels : mapping, optional
+        Columns to put before the others.
 
     Returns
     -------
     DataFrame
-        One row per view: ``view``; of the ``n_first`` keypoints of the first view the share
+        One row per view: `labels`; ``view``; its ``zoom`` against the first; of the ``n_first`` keypoints of the first view the share
         ``share_found`` that has a same one in this view, with its 95 % Wilson interval ``low_found,
         high_found``; of the ``n_view`` keypoints of this view the share ``share_right`` that has a
         same one in the first, with ``low_right, high_right``; over the keypoints of the first view
@@ -59,12 +64,14 @@ def against_first(
         common[(common["view"] == 0) & rows].reset_index(drop=True) for rows in (True, inside)
     )
     rows = []
-    for number in range(len(everywhere.specs)):
+    for number, spec in enumerate(everywhere.specs):
         here = common["view"] == number
         view, asked = (common[here & rows].reset_index(drop=True) for rows in (True, inside))
         rows.append(
             {
+                **(labels or {}),
                 "view": number,
+                "zoom": spec.step / everywhere.specs[0].step,
                 **_share("first", "found", matched(first, view, **same)),
                 **_share("view", "right", matched(asked, first_all, **same)),
                 **_offsets(first, view, same),

@@ -8,23 +8,21 @@ added to it: what that changes says what its own can have changed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from keystab.camera.common_field import common_scales
 from keystab.camera.simulation import Scene, simulate
 from keystab.camera.views import ViewSpec
+from keystab.detection.detector import detect_keypoints
 from keystab.experiments.first_view import against_first
 from keystab.matching.common_range import CommonRange
 from keystab.prediction.noise_level import estimated_noise
 from keystab.utils.random import random_generator
-
-Detect = Callable[[NDArray[np.float64]], pd.DataFrame]
-"""Finds the keypoints of a view: columns ``y, x, sigma``."""
-
 
 def noise_seen(noise: float, blur: float, step: float) -> float:
     r"""Noise of a view of a noisy reference, in closed form.
@@ -51,8 +49,8 @@ def reference_noise_table(
     reference: NDArray[np.floating[Any]],
     spec: ViewSpec,
     factors: Sequence[float],
-    detect: Detect,
-    everywhere: CommonRange,
+    detector: Mapping[str, Any],
+    compared: Mapping[str, Any],
     same: Mapping[str, Any],
 ) -> pd.DataFrame:
     """Add noise to the reference, in units of what it is estimated to have, and see what changes.
@@ -65,10 +63,10 @@ def reference_noise_table(
         The view, without noise of its own.
     factors : sequence of float
         Noise to add, in units of the estimated noise of the reference.
-    detect : callable
-        Finds the keypoints of a view.
-    everywhere : CommonRange
-        What is compared, of one view.
+    detector : mapping
+        Options of `keystab.detect_keypoints`, ``sigma_min`` among them.
+    compared : mapping
+        ``border`` in pixels of the view, ``first_scale`` and ``last_scale`` over ``sigma_min``.
     same : mapping
         Options of `keystab.matching.correspondence.same`.
 
@@ -92,17 +90,19 @@ def reference_noise_table(
     clean, noise = simulate(Scene(reference), spec), own * simulate(Scene(draw), spec)
     added = [0.0, *factors]
     found = [
-        detect(clean + factor * noise).assign(view=number) for number, factor in enumerate(added)
+        detect_keypoints(clean + factor * noise, spec.blur, **detector).assign(view=number)
+        for number, factor in enumerate(added)
     ]
-    views = CommonRange(
-        [spec] * len(added), everywhere.reference_shape, everywhere.margin, everywhere.low,
-        everywhere.high,
-    )  # fmt: skip
-    table = against_first(pd.concat(found, ignore_index=True), views, same)
+    specs = [spec] * len(added)
+    ends = (compared["first_scale"], compared["last_scale"])
+    scales = common_scales(specs, detector["sigma_min"], 1, *ends)
+    everywhere = CommonRange(specs, np.shape(reference), compared["border"], *scales)
+    table = against_first(pd.concat(found, ignore_index=True), everywhere, same)
     seen = float(np.std(noise))
     table.insert(0, "factor", added)
+    theory = noise_seen(own, spec.blur, spec.step)
+    of_own = {"noise_added": own, "noise_view": seen, "noise_theory": theory}
     table.insert(1, "noise_reference", own)
-    table.insert(2, "noise_added", own * table["factor"])
-    table.insert(3, "noise_view", seen * table["factor"])
-    table.insert(4, "noise_theory", noise_seen(own, spec.blur, spec.step) * table["factor"])
-    return table[table["factor"] > 0].drop(columns="view").reset_index(drop=True)
+    for place, (name, unit) in enumerate(of_own.items(), 2):
+        table.insert(place, name, unit * table["factor"])
+    return table[table["factor"] > 0].drop(columns=["view", "zoom"]).reset_index(drop=True)

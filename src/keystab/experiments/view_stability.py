@@ -64,6 +64,41 @@ def keypoints_of_views(common: pd.DataFrame, n_views: int, same: Mapping[str, An
     return MatchedViews(common, found, unique.gap)
 
 
+def parts_by(tilts: Sequence[float], n_views: int) -> list[tuple[dict[str, float], list[int]]]:
+    """Parts of a set that are matched by themselves: the first view with those of each tilt.
+
+    Parameters
+    ----------
+    tilts : sequence of float
+        Tilt of every view; empty where all views are matched together.
+    n_views : int
+        Views of the set.
+
+    Returns
+    -------
+    list of (labels, numbers of views)
+
+    Examples
+    --------
+    >>> parts_by([0.0, 5.0, 40.0, 5.0], 4)
+    [({'tilt': 5.0}, [0, 1, 3]), ({'tilt': 40.0}, [0, 2])]
+    >>> parts_by([], 2)
+    [({}, [0, 1])]
+    """
+    if not tilts:
+        return [({}, list(range(n_views)))]
+    numbers = {tilt: [k for k, other in enumerate(tilts) if k and other == tilt] for tilt in tilts}
+    return [({"tilt": tilt}, [0, *views]) for tilt, views in numbers.items() if views]
+
+
+def of_views(common: pd.DataFrame, members: Sequence[int]) -> pd.DataFrame:
+    """Detections in some views of a set, which are numbered anew; all where these are all."""
+    if common["view"].isin(members).all():
+        return common
+    table = common[common["view"].isin(members)].reset_index(drop=True)
+    return table.assign(view=table["view"].map({view: k for k, view in enumerate(members)}))
+
+
 def labelled(table: pd.DataFrame, labels: Labels) -> pd.DataFrame:
     """Put columns of one value each before those of a table."""
     return pd.concat(

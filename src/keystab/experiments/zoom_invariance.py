@@ -9,18 +9,75 @@ sampling of the scale-space, no refinement and no tolerance stands between them 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
+from keystab.camera.simulation import whole_shape
+from keystab.camera.views import ViewSpec
 from keystab.evaluation.intervals import wilson_interval
 from keystab.matching.common_range import CommonRange
 from keystab.matching.correspondence import pairs_between
+from keystab.utils import validation
+
+#: Margin in units of the largest blur; scales beyond the range at which counterparts are sought.
+_MARGIN, _BEYOND = 6.0, 1.05
 
 
-def zoom_table(extrema: Sequence[pd.DataFrame], everywhere: CommonRange) -> pd.DataFrame:
+def zoomed_views(
+    spec: ViewSpec,
+    zooms: Sequence[float],
+    reference_shape: tuple[int, int],
+    sigma_min: float,
+    kappa: float,
+) -> tuple[CommonRange, list[tuple[float, float]]]:
+    """Views of the whole scene at several zooms, what is compared, and where extrema are sought.
+
+    Parameters
+    ----------
+    spec : ViewSpec
+        The first view.
+    zooms : sequence of float
+        Zooms of the others against it, above 1.
+    reference_shape : tuple of int
+        Height and width of the reference in pixels.
+    sigma_min : float
+        First scale of every view, in its pixels.
+    kappa : float
+        Ratio of the two blurs.
+
+    Returns
+    -------
+    everywhere : CommonRange
+        The views, and one octave of scales from the first that all of them have; its margin is six
+        times the largest blur, so that no border matters.
+    ends : list of (float, float)
+        Scales of each view, in its pixels, that hold this octave with 5 % on either side.
+
+    Examples
+    --------
+    >>> spec = ViewSpec(blur=1.1, step=10.0, shape=(100, 150))
+    >>> everywhere, ends = zoomed_views(spec, [1.5], (1000, 1500), 1.1, 1.25)
+    >>> everywhere.specs[1].shape, everywhere.margin, ends[1][0].__round__(9)
+    ((66, 100), 26.0, 1.1)
+    """
+    specs = [spec]
+    for zoom in zooms:
+        step = spec.step * validation.number("zooms", zoom, above=1)
+        specs.append(replace(spec, step=step, shape=whole_shape(reference_shape, step)))
+    low = _BEYOND * sigma_min * max(1.0, *zooms)
+    margin = math.ceil(_MARGIN * kappa * 2 * low)
+    everywhere = CommonRange(specs, reference_shape, float(margin), low, 2 * low)
+    ratios = [view.step / spec.step for view in specs]
+    return everywhere, [(low / _BEYOND / r, 2 * low * _BEYOND / r) for r in ratios]
+
+
+def zoom_table(
+    extrema: Sequence[pd.DataFrame], everywhere: CommonRange, labels: Mapping[str, float]
+) -> pd.DataFrame:
     r"""Hold the true extrema of zoomed views against those of the first.
 
     Parameters
@@ -29,11 +86,13 @@ def zoom_table(extrema: Sequence[pd.DataFrame], everywhere: CommonRange) -> pd.D
         ``y, x, sigma, sign`` of every view, in its pixels.
     everywhere : CommonRange
         Field of view and range of scales of all views; counterparts may lie beyond its scales.
+    labels : mapping
+        Columns to put before the others.
 
     Returns
     -------
     DataFrame
-        One row per view but the first: ``zoom``; of the ``n_first`` extrema of the first view the
+        One row per view but the first: `labels`; ``zoom``; of the ``n_first`` extrema of the first view the
         share ``share_found`` with an extremum of the same sign nearer than the limits of equation
         22, with its 95 % Wilson interval ``low_found, high_found``; of the nearest ones
         ``scale_residual``, the median of :math:`|\mu \sigma_2 / \lambda \sigma_1 - 1|`, and
@@ -47,7 +106,7 @@ def zoom_table(extrema: Sequence[pd.DataFrame], everywhere: CommonRange) -> pd.D
     >>> ends = CommonRange(views, (60, 60), 0.0, 1.0, 9.0)
     >>> first = pd.DataFrame({"y": [29.5, 35.5], "x": [29.5, 29.5], "sigma": [3.0, 6.0]})
     >>> other = pd.DataFrame({"y": [29.5, 33.5], "x": [29.5, 29.5], "sigma": [2.0, 4.04]})
-    >>> table = zoom_table([first.assign(sign=1), other.assign(sign=1)], ends)
+    >>> table = zoom_table([first.assign(sign=1), other.assign(sign=1)], ends, {})
     >>> table[["share_found", "scale_residual", "location_residual"]].round(3).to_numpy().tolist()
     [[1.0, 0.005, 0.0]]
     """
@@ -71,6 +130,7 @@ def zoom_table(extrema: Sequence[pd.DataFrame], everywhere: CommonRange) -> pd.D
         some = len(nearest) > 0
         rows.append(
             {
+                **labels,
                 "zoom": spec.step / everywhere.specs[0].step,
                 "n_first": len(first),
                 "share_found": len(nearest) / len(first) if len(first) else np.nan,

@@ -57,6 +57,10 @@ Comparison
     cubes : table of their samples
     curve_n_spo : samplings whose curves are drawn
     iterations : further values of N_interp
+    tilts : tilt of each view, where those of one tilt are matched by themselves
+    pairs : table of what becomes of the keypoints of the first view in the others
+    interpolation : table of how stable the interpolation is
+    dead : table of what is detected less than half a step above the first scale
     minimum_share : least share of the views that see a keypoint whose precision counts
     curves : table of curves of stability
     precision : table of precisions
@@ -103,6 +107,11 @@ Audits
 Theory
     profiles : table of profiles of point spread functions
     camera_blur : camera blur, pixels
+    ranges : table of the camera blurs between which cameras in focus lie
+    aliasing : table of the aliased part of views
+    wrong_blur : table of scale-spaces of a wrong blur, against dilated ones
+    zoomed : table of true extrema of zoomed views, against each other
+    noisy : table of what noise of the reference changes
     n_oct : octaves
 
 Claims and results

@@ -1,4 +1,4 @@
-"""Match the detections of all views of a set, sampling by sampling (figures 7, 8 and S1)."""
+"""Match the detections of all views of a set, sampling by sampling (figures 7, 8, S1 and S5)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +21,7 @@ def main(
     n_resamples: int,
     max_offsets: Sequence[float] = (),
     iterations: Sequence[int] = (),
+    tilts: Sequence[float] = (),
     *,
     curves: Path,
     precision: Path,
@@ -33,6 +34,8 @@ def main(
         curve_table,
         keypoints_of_views,
         localization_table,
+        of_views,
+        parts_by,
     )
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_views
@@ -50,14 +53,16 @@ def main(
         for choice in choices(discrete, models, limits):
             labels = {"n_spo": n, **choice.labels}
             common = everywhere.common(choice.keypoints, choice.scale_column)
-            matched = keypoints_of_views(common, len(seen), vars(same))
-            count_tables.append(count_table(matched, labels))
-            if n in curve_n_spo:
-                curve_tables.append(curve_table(matched, labels, n_resamples))
-            if choice.limits in (None, usual):
-                precision_tables.append(
-                    localization_table(matched, labels, minimum_share, n_resamples)
-                )
+            for part, members in parts_by(tilts, len(seen)):
+                own, some = {**part, **labels}, of_views(common, members)
+                matched = keypoints_of_views(some, len(members), vars(same))
+                count_tables.append(count_table(matched, own))
+                if n in curve_n_spo:
+                    curve_tables.append(curve_table(matched, own, n_resamples))
+                if choice.limits in (None, usual):
+                    precision_tables.append(
+                        localization_table(matched, own, minimum_share, n_resamples)
+                    )
     write_joined(curve_tables, curves)
     write_joined(precision_tables, precision)
     print(write_joined(count_tables, counts).to_string(index=False))

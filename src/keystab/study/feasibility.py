@@ -13,7 +13,7 @@ from keystab.camera.view_sets import assumed_blur, expanded, per_view
 from keystab.camera.views import effective_blur
 from keystab.errors import InputError
 from keystab.study.picture_checks import Settings, picture_problems, still_blur
-from keystab.study.plan import FIGURES, kept_n_spo
+from keystab.study.plan import FIGURES, STATED_SWEEPS, kept_n_spo
 from keystab.study.result_folders import path_problems
 from keystab.study.settings import refuse
 
@@ -33,7 +33,7 @@ SWEPT_SETS = {
     about.views: (name.replace("fig", "figure "), about.swept)
     for name, about in FIGURES.items()
     if about.swept
-}
+} | {name: ("what the claims ask", key) for name, key in STATED_SWEEPS.items()}
 """Sweeps of sets of views that are searched: what is made of them, and what they differ in."""
 
 
@@ -82,7 +82,7 @@ def sweep_problems(settings: Settings) -> list[str]:
             problems.append(
                 f"sets.{name}.sweep has {swept}, allowed is {key}: {figure} is made from it"
             )
-        elif len(views["n_spo"]) != 1:
+        elif len(views["n_spo"]) != 1 and name != "unbalanced":
             problems.append(
                 f"sets.{name}.n_spo is {views['n_spo']}, allowed is one sampling for {figure}"
             )
@@ -203,12 +203,15 @@ def searched_problems(settings: Settings) -> list[str]:
     problems = []
     curves = settings["stability"]["curve_n_spo"]
     sigma_min = settings["detector"]["sigma_min"]
-    compared = [settings["sets"][name]["n_spo"] for name in ("translations", "zooms", "rotations")]
+    compared = [
+        settings["sets"][name]["n_spo"]
+        for name in ("translations", "zooms", "rotations", "tilts")
+    ]
     shared = sorted(set(compared[0]).intersection(*compared))
     if all(compared) and set(curves) - set(shared):
         problems.append(
             f"stability.curve_n_spo is {curves}, allowed are members of n_spo of "
-            f"sets.translations, sets.zooms and sets.rotations, which share {shared}"
+            f"sets.translations, sets.zooms, sets.rotations and sets.tilts, which share {shared}"
         )
     problems += _assumed_blur_problems(settings)
     for name, views in settings["sets"].items():

@@ -62,11 +62,13 @@ FIGURES = {
     # stability and precision when the camera rotates
     "figS1": Figure(("figS1_curves.csv", "figS1_precision.csv"), "rotations"),
     # a wrong blur, by its sign
-    "figS2": Figure(("figS2.csv",)),
+    "figS2": Figure(("figS2.csv", "blur_zooms_pairs.csv")),
     # the blur of a real camera
-    "figS3": Figure(("figS3.csv", "figS3_profiles.csv"), of_scene=False),
+    "figS3": Figure(("figS3.csv", "figS3_profiles.csv", "figS3_ranges.csv"), of_scene=False),
     # blobs, whose scale is known
     "figS4": Figure(("figS4.csv",), of_scene=False),
+    # stability and precision when the scene is seen from the side
+    "figS5": Figure(("figS5_counts.csv", "figS5_curves.csv", "figS5_precision.csv"), "tilts"),
     # why extrema come and go at any density
     "floor": Figure(("floor_rates.csv", "floor_summary.csv", "floor_variants.csv")),
     # detections against the true extrema
@@ -99,6 +101,9 @@ FIGURES = {
     ),
 }
 """The figures in their order: what each shows, and the tables and sets that it is made from."""
+
+STATED_SWEEPS = {"blur_zooms": "assumed_blur", "unbalanced": "delta_min", "large_scales": "noise"}
+"""Sweeps of sets of views that answer statements of the text, and what their sets differ in."""
 
 TABLES_NOT_DRAWN = ("fig5_features.csv", "refinement.csv")
 """Tables of a scene that no figure draws and no claim needs."""
@@ -138,7 +143,7 @@ def figures_of_views(swept: bool, against_scale: bool = False) -> str:
     Examples
     --------
     >>> figures_of_views(swept=False), figures_of_views(swept=True, against_scale=True)
-    ('fig7|fig8|figS1', 'fig11|fig12')
+    ('fig7|fig8|figS1|figS5', 'fig11|fig12')
     """
     names = [
         name
@@ -166,6 +171,33 @@ def sets_of_figure(settings: Settings, figure: str) -> list[str]:
     """Names of the sets of views that a figure studies: one, or all of a sweep."""
     views = FIGURES[figure].views
     return list(settings["sweeps"].get(views, [views]))
+
+
+def searches_of_sweep(settings: Settings, sweep: str) -> list[Searched]:
+    """Sets of a sweep that no figure is about, at all their samplings."""
+    return searches(settings, *settings["sweeps"][sweep])
+
+
+def stated_key(_settings: Settings, sweep: str) -> str:
+    """Name of what the sets of such a sweep differ in."""
+    return STATED_SWEEPS[sweep]
+
+
+def octaves_of_sweep(settings: Settings, sweep: str) -> list[float]:
+    """First scales of the octaves in which the sets of a sweep are searched."""
+    views = settings["sets"][next(iter(settings["sweeps"][sweep]))]
+    return [views["sigma_min"] * 2.0**octave for octave in range(views["n_oct"])]
+
+
+def finest_curve(settings: Settings) -> int:
+    """Scales per octave of the finest sampling whose curves are drawn."""
+    n_spo: int = max(settings["stability"]["curve_n_spo"])
+    return n_spo
+
+
+def tilts(settings: Settings, figure: str) -> list[float]:
+    """Tilt of every view of a figure that matches the views of each tilt by themselves."""
+    return settings["sets"]["tilts"]["tilt"] if figure == "figS5" else []
 
 
 def swept(_settings: Settings, figure: str) -> str:
