@@ -41,7 +41,8 @@ def against_first(
     Returns
     -------
     DataFrame
-        One row per view: `labels`; ``view``; its ``zoom`` against the first; of the ``n_first`` keypoints of the first view the share
+        One row per view: `labels`; ``view``; its ``blur`` and its ``zoom`` against the first;
+        of the ``n_first`` keypoints of the first view the share
         ``share_found`` that has a same one in this view, with its 95 % Wilson interval ``low_found,
         high_found``; of the ``n_view`` keypoints of this view the share ``share_right`` that has a
         same one in the first, with ``low_right, high_right``; over the keypoints of the first view
@@ -71,6 +72,7 @@ def against_first(
             {
                 **(labels or {}),
                 "view": number,
+                "blur": spec.blur,
                 "zoom": spec.step / everywhere.specs[0].step,
                 **_share("first", "found", matched(first, view, **same)),
                 **_share("view", "right", matched(asked, first_all, **same)),

@@ -105,4 +105,4 @@ def reference_noise_table(
     table.insert(1, "noise_reference", own)
     for place, (name, unit) in enumerate(of_own.items(), 2):
         table.insert(place, name, unit * table["factor"])
-    return table[table["factor"] > 0].drop(columns=["view", "zoom"]).reset_index(drop=True)
+    return table[table["factor"] > 0].drop(columns=["view", "blur", "zoom"]).reset_index(drop=True)
