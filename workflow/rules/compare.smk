@@ -40,6 +40,7 @@ rule match_views:
             "stability.n_resamples",
             max_offsets=of(plan.further_limits, "{figure}", "max_offsets"),
             iterations=of(plan.further_limits, "{figure}", "max_iterations"),
+            curve_n_spo=of(plan.curve_n_spo, "{figure}"),
             tilts=of(plan.tilts, "{figure}"),
         ),
     message:

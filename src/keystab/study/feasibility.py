@@ -203,15 +203,12 @@ def searched_problems(settings: Settings) -> list[str]:
     problems = []
     curves = settings["stability"]["curve_n_spo"]
     sigma_min = settings["detector"]["sigma_min"]
-    compared = [
-        settings["sets"][name]["n_spo"]
-        for name in ("translations", "zooms", "rotations", "tilts")
-    ]
+    compared = [settings["sets"][name]["n_spo"] for name in ("translations", "zooms", "rotations")]
     shared = sorted(set(compared[0]).intersection(*compared))
     if all(compared) and set(curves) - set(shared):
         problems.append(
             f"stability.curve_n_spo is {curves}, allowed are members of n_spo of "
-            f"sets.translations, sets.zooms, sets.rotations and sets.tilts, which share {shared}"
+            f"sets.translations, sets.zooms and sets.rotations, which share {shared}"
         )
     problems += _assumed_blur_problems(settings)
     for name, views in settings["sets"].items():

@@ -189,6 +189,12 @@ def octaves_of_sweep(settings: Settings, sweep: str) -> list[float]:
     return [views["sigma_min"] * 2.0**octave for octave in range(views["n_oct"])]
 
 
+def curve_n_spo(settings: Settings, figure: str) -> list[int]:
+    """Samplings whose curves a figure of views has; of tilted views all that are searched."""
+    name = "sets.tilts.n_spo" if figure == "figS5" else "stability.curve_n_spo"
+    return list(setting(settings, name))
+
+
 def finest_curve(settings: Settings) -> int:
     """Scales per octave of the finest sampling whose curves are drawn."""
     n_spo: int = max(settings["stability"]["curve_n_spo"])
