@@ -152,7 +152,9 @@ def _draw_zooms(panels: Sequence[Axes], table: DataFrame) -> None:
     found.set_ylabel("share (%)")
     shift.set_ylabel("$\\log_2(\\sigma_2 / \\sigma_1)$ (octaves)")
     _name_lines(found, names)
+    zooms = sorted(table["zoom"].unique())
     for ax in panels:
+        ax.set_xticks(zooms, [f"{zoom:g}" for zoom in zooms])
         ax.set_xlabel("zoom")
         style.finish_axes(ax)
 
