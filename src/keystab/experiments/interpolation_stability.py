@@ -68,8 +68,8 @@ def interpolation_table(
     low, high = wilson_interval(n_accepted, len(inside))
     matched = keypoints_of_views(everywhere.common(found), len(everywhere.specs), same)
     spread = localization(matched.common, matched.found)
-    location = median_interval(spread["sd_location"].to_numpy())
-    scale = median_interval(spread["sd_log2_sigma"].to_numpy())
+    location = rank_interval(spread["sd_location"].to_numpy())
+    scale = rank_interval(spread["sd_log2_sigma"].to_numpy())
     row = {
         "n_extrema": len(inside),
         "condition": float(condition.median()) if len(condition) else np.nan,
@@ -84,22 +84,24 @@ def interpolation_table(
     return labelled(pd.DataFrame([row]), labels)
 
 
-def median_interval(values: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Median, and its 95 % interval from the ranks that a binomial distribution gives.
+def rank_interval(values: NDArray[np.float64], share: float = 0.5) -> tuple[float, float, float]:
+    """Quantile, and its 95 % interval from the ranks that a binomial distribution gives.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         Independent draws from any continuous distribution.
+    share : float
+        Which quantile; by default the median.
 
     Returns
     -------
-    median, low, high : float
-        NaN without values; the ends are the extremes of the values where there are less than six.
+    quantile, low, high : float
+        NaN without values; the ends are the extremes of the values where there are too few.
 
     Examples
     --------
-    >>> [round(end, 6) for end in median_interval(np.arange(1.0, 101.0))]
+    >>> [round(end, 6) for end in rank_interval(np.arange(1.0, 101.0))]
     [50.5, 40.0, 61.0]
     """
     from scipy.stats import binom
@@ -108,5 +110,7 @@ def median_interval(values: NDArray[np.float64]) -> tuple[float, float, float]:
     if not n:
         return np.nan, np.nan, np.nan
     ordered = np.sort(values)
-    rank = max(int(binom.ppf(0.025, n, 0.5)) - 1, 0)  # so many values below leave 2.5 % or less
-    return float(np.median(ordered)), float(ordered[rank]), float(ordered[n - 1 - rank])
+    # The value of rank k lies below the quantile unless fewer than k draws do, and so on above.
+    low = max(int(binom.ppf(0.025, n, share)) - 1, 0)
+    high = min(int(binom.ppf(0.975, n, share)), n - 1)
+    return float(np.quantile(ordered, share)), float(ordered[low]), float(ordered[high])

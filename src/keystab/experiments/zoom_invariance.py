@@ -15,10 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from keystab.camera.simulation import whole_shape
 from keystab.camera.views import ViewSpec
 from keystab.evaluation.intervals import wilson_interval
+from keystab.experiments.interpolation_stability import rank_interval
 from keystab.matching.common_range import CommonRange
 from keystab.matching.correspondence import pairs_between
 from keystab.utils import validation
@@ -97,7 +99,8 @@ def zoom_table(
         22, with its 95 % Wilson interval ``low_found, high_found``; of the nearest ones
         ``scale_residual``, the median of :math:`|\mu \sigma_2 / \lambda \sigma_1 - 1|`, and
         ``location_residual``, that of the distance over :math:`\sigma_1`; ``q95_scale,
-        q95_location``, the quantiles of 95 %. NaN where there is none.
+        q95_location``, the quantiles of 95 %, with 95 % intervals by ranks ``low_scale, high_scale,
+        low_location, high_location``. NaN where there is none.
 
     Examples
     --------
@@ -127,7 +130,6 @@ def zoom_table(
         scale = np.abs(two["sigma"].to_numpy() / sigma - 1)
         distance = np.hypot(*(one[c].to_numpy() - two[c].to_numpy() for c in ("y", "x"))) / sigma
         low, high = wilson_interval(len(nearest), len(first))
-        some = len(nearest) > 0
         rows.append(
             {
                 **labels,
@@ -136,10 +138,13 @@ def zoom_table(
                 "share_found": len(nearest) / len(first) if len(first) else np.nan,
                 "low_found": float(low),
                 "high_found": float(high),
-                "scale_residual": np.median(scale) if some else np.nan,
-                "q95_scale": np.quantile(scale, 0.95) if some else np.nan,
-                "location_residual": np.median(distance) if some else np.nan,
-                "q95_location": np.quantile(distance, 0.95) if some else np.nan,
+                **_residuals("scale", scale),
+                **_residuals("location", distance),
             }
         )
     return pd.DataFrame(rows)
+
+
+def _residuals(name: str, values: NDArray[np.float64]) -> dict[str, float]:
+    ends = zip((f"q95_{name}", f"low_{name}", f"high_{name}"), rank_interval(values, 0.95), strict=True)
+    return {f"{name}_residual": rank_interval(values)[0], **dict(ends)}
