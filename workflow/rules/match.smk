@@ -58,6 +58,7 @@ rule match_samplings:
             "samplings.n_spo",
             parameters.Scales,
             parameters.Same,
+            "comparison.soft_ends",
             parameters.Compared,
             parameters.Stable,
         ),

@@ -47,6 +47,7 @@ def kappa_tables(
     shape: tuple[int, int],
     border: float,
     same: Mapping[str, Any],
+    soft_ends: bool = False,
 ) -> KappaTables:
     """Match the keypoints of all ratios by normalised scale.
 
@@ -64,6 +65,8 @@ def kappa_tables(
         Margin of the view that is left out, in pixels.
     same : mapping
         Options of `keystab.matching.correspondence.same`.
+    soft_ends : bool
+        Whether counterparts may lie beyond the common range of normalised scales.
 
     Returns
     -------
@@ -85,7 +88,10 @@ def kappa_tables(
     kept = comparable(normalised, shape, low, 1.0, border, "sigma", high / low)
     common = normalised[kept].reset_index(drop=True)
     unique = unique_keypoints(common, **same, set_column="kappa")
-    found = matches(unique, common, **same, set_column="kappa", sets=kappas) >= 0
+    counterparts = common
+    if soft_ends:
+        counterparts = normalised[comparable(normalised, shape, 0.0, 1.0, border, "sigma")]
+    found = matches(unique, counterparts, **same, set_column="kappa", sets=kappas) >= 0
     counts = pd.DataFrame({"kappa": kappas})
     counts["delta_min"] = [balanced_delta(n_spo, kappa, sigma_min) for kappa in kappas]
     for name, members in (("n_octave", table[octave]), ("n_common", common)):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from keystab.evaluation.intervals import wilson_interval
 from keystab.evaluation.stability import new_and_lost
+from keystab.matching.common_range import compared
 from keystab.matching.unique_keypoints import matches, minimum_unique_set
 from keystab.prediction.features import condition_numbers, hessians
 
@@ -142,7 +143,7 @@ def keypoints_of_samplings(
     Parameters
     ----------
     common : DataFrame
-        Comparable detections of all samplings.
+        Comparable detections of all samplings, and those that are counterparts only.
     samplings : sequence of int
         Values of n_spo.
     same : mapping
@@ -151,7 +152,8 @@ def keypoints_of_samplings(
         Choose among minimum sets the other way round, see
         `keystab.matching.unique_keypoints.unique_keypoints`.
     """
-    unique = minimum_unique_set(common, **same, set_column="n_spo", reverse_order=reverse_order)
+    asked = common[compared(common)]
+    unique = minimum_unique_set(asked, **same, set_column="n_spo", reverse_order=reverse_order)
     found = matches(unique.keypoints, common, **same, set_column="n_spo", sets=samplings)
     keypoints = unique.keypoints[["y", "x", "sigma", "sign"]].reset_index(drop=True)
     keypoints.insert(0, "keypoint", np.arange(len(keypoints)))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from keystab.evaluation.intervals import Purpose, normal_half_width, wilson_interval
 from keystab.evaluation.localization import mean_localization
 from keystab.evaluation.stability import stability_curve
-from keystab.matching.common_range import CommonRange
+from keystab.matching.common_range import CommonRange, compared
 from keystab.matching.unique_keypoints import matches, minimum_unique_set
 
 Labels = Mapping[str, Any]
@@ -30,7 +30,7 @@ class MatchedViews(NamedTuple):
     Attributes
     ----------
     common : DataFrame
-        The detections that were compared.
+        The detections that were compared, and those that are counterparts only.
     found : ndarray of int, shape (n_unique, n_views)
         Row positions in `common`, -1 where a keypoint is not detected.
     gap : int
@@ -59,7 +59,7 @@ def keypoints_of_views(common: pd.DataFrame, n_views: int, same: Mapping[str, An
     same : mapping
         Options of `keystab.matching.correspondence.same`.
     """
-    unique = minimum_unique_set(common, **same, set_column="view")
+    unique = minimum_unique_set(common[compared(common)], **same, set_column="view")
     found = matches(unique.keypoints, common, **same, set_column="view", sets=range(n_views))
     return MatchedViews(common, found, unique.gap)
 
@@ -149,7 +149,8 @@ def count_table(matched: MatchedViews, labels: Labels) -> pd.DataFrame:
         95 % Wilson interval ``low_always, high_always``.
     """
     n_unique, n_views = matched.found.shape
-    per_view = np.bincount(matched.common["view"].to_numpy(np.int64), minlength=n_views)
+    asked = matched.common[compared(matched.common)]
+    per_view = np.bincount(asked["view"].to_numpy(np.int64), minlength=n_views)
     error = normal_half_width(per_view)
     always = int(matched.seen.all(axis=1).sum())
     low, high = wilson_interval(always, n_unique)
@@ -184,7 +185,7 @@ def scale_table(
     detections : DataFrame
         Refined keypoints of all views.
     everywhere : CommonRange
-        Its field of view is used; its scales are replaced.
+        Its field of view and whether its ends are soft are used; its scales are replaced.
     starts : sequence of float
         First scales of the octaves, in pixels of the first view.
     same : mapping
@@ -208,7 +209,7 @@ def scale_table(
     n_views = len(everywhere.specs)
     for start in starts:
         field = (everywhere.specs, everywhere.reference_shape, everywhere.margin)
-        octave = CommonRange(*field, start, 2 * start)
+        octave = CommonRange(*field, start, 2 * start, everywhere.soft)
         matched = keypoints_of_views(octave.common(detections), n_views, same)
         curve = stability_curve(
             matched.seen,

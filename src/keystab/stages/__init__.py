@@ -65,6 +65,7 @@ Comparison
     curves : table of curves of stability
     precision : table of precisions
     scales : table of counts against scale
+    soft_ends : whether counterparts may lie beyond the ends of the range of scales
     border : pixels left out at the border of the view
     assumed_blur : camera blur that was assumed, pixels
     kappa : ratio of the two blurs

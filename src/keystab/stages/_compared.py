@@ -25,9 +25,9 @@ def inside(compared: Compared, sigma_min: float, shape: tuple[int, int]) -> Insi
     return rows
 
 
-def common_range(views: Views, compared: ComparedInViews) -> CommonRange:
+def common_range(views: Views, compared: ComparedInViews, soft_ends: bool = False) -> CommonRange:
     """Field of view and range of scales that all views of a set have in common."""
     it, specs, margin = compared, views.specs, max(compared.guard, compared.border)
     zooms = zooms_in_common_field(specs, views.reference_shape, margin)
     scales = common_scales(specs, it.sigma_min, it.n_oct, it.first_scale, it.last_scale, zooms)
-    return CommonRange(specs, views.reference_shape, margin, *scales)
+    return CommonRange(specs, views.reference_shape, margin, *scales, soft_ends)

@@ -15,6 +15,7 @@ def main(
     same: Same,
     sift: SiftFilters,
     n_resamples: int,
+    soft_ends: bool = False,
     *,
     curves: Path,
     counts: Path,
@@ -29,7 +30,7 @@ def main(
     from keystab.stages._tables import write_joined
 
     seen = read_views(*views)
-    everywhere = common_range(seen, compared)
+    everywhere = common_range(seen, compared, soft_ends)
     refined = refined_keypoints(
         read_table(extrema), read_table(traces), sift.max_offset, sift.max_iterations
     )

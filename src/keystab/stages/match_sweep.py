@@ -20,6 +20,7 @@ def main(
     n_resamples: int,
     octaves: Octaves | None = None,
     n_spo: Sequence[int] = (),
+    soft_ends: bool = False,
     *,
     curves: Path,
     counts: Path,
@@ -49,7 +50,7 @@ def main(
     numbers = [{"n_spo": n} for n in n_spo] or [{}] * len(values)
     for value, number, store, *paths in zip(values, numbers, views, extrema, traces, strict=True):
         seen = read_views(*store)
-        everywhere, labels = common_range(seen, compared), {name: value, **number}
+        everywhere, labels = common_range(seen, compared, soft_ends), {name: value, **number}
         tables = [read_table(path) for path in paths]
         keypoints = refined_keypoints(*tables, **vars(accepted))
         matched = keypoints_of_views(everywhere.common(keypoints), len(seen), vars(same))

@@ -22,6 +22,7 @@ def main(
     max_offsets: Sequence[float] = (),
     iterations: Sequence[int] = (),
     tilts: Sequence[float] = (),
+    soft_ends: bool = False,
     *,
     curves: Path,
     precision: Path,
@@ -43,7 +44,7 @@ def main(
     from keystab.stages._tables import write_joined
 
     seen = read_views(*views)
-    everywhere = common_range(seen, compared)
+    everywhere = common_range(seen, compared, soft_ends)
     usual = (accepted.max_offset, accepted.max_iterations)
     further = [(m, n) for n in iterations for m in max_offsets]
     curve_tables, precision_tables, count_tables = [], [], []
