@@ -7,14 +7,14 @@ all views could have seen them, and matched there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.evaluation.intervals import Purpose, normal_half_width, wilson_interval
+from keystab.evaluation.intervals import BOTH, Purpose, normal_half_width, wilson_interval
 from keystab.evaluation.localization import mean_localization
 from keystab.evaluation.stability import stability_curve
 from keystab.matching.common_range import CommonRange, compared
@@ -121,9 +121,16 @@ def curve_table(matched: MatchedViews, labels: Labels, n_resamples: int) -> pd.D
 
 
 def localization_table(
-    matched: MatchedViews, labels: Labels, minimum_share: float, n_resamples: int
+    matched: MatchedViews,
+    labels: Labels,
+    minimum_share: float,
+    n_resamples: int,
+    resample: Collection[str] = BOTH,
 ) -> pd.DataFrame:
-    """Mean precision of the keypoints seen often enough (figures 7 c, 8 b).
+    """Mean precision of the keypoints seen often enough (figures 7 c, 8 b, S5 b).
+
+    Keypoints are drawn anew for its interval, and views as well unless they are no sample of all
+    that there could be, as are the few directions from which a scene is seen at a tilt.
 
     Returns
     -------
@@ -132,7 +139,7 @@ def localization_table(
         columns of `keystab.evaluation.localization.mean_localization`.
     """
     table = mean_localization(
-        matched.common, matched.found, minimum_share, n_resamples, purpose_of(labels)
+        matched.common, matched.found, minimum_share, n_resamples, purpose_of(labels), resample
     )
     return labelled(table.reset_index(), labels)
 

@@ -29,6 +29,7 @@ def main(
     counts: Path,
 ) -> None:
     """Read extrema and traces of a set at several samplings; write curves, precision and counts."""
+    from keystab.evaluation.intervals import BOTH
     from keystab.experiments.refinement_limits import choices
     from keystab.experiments.view_stability import (
         count_table,
@@ -45,6 +46,7 @@ def main(
 
     seen = read_views(*views)
     everywhere = common_range(seen, compared, soft_ends)
+    drawn = ("keypoints",) if tilts else BOTH
     usual = (accepted.max_offset, accepted.max_iterations)
     further = [(m, n) for n in iterations for m in max_offsets]
     curve_tables, precision_tables, count_tables = [], [], []
@@ -62,7 +64,7 @@ def main(
                     curve_tables.append(curve_table(matched, own, n_resamples))
                 if choice.limits in (None, usual):
                     precision_tables.append(
-                        localization_table(matched, own, minimum_share, n_resamples)
+                        localization_table(matched, own, minimum_share, n_resamples, drawn)
                     )
     write_joined(curve_tables, curves)
     write_joined(precision_tables, precision)
