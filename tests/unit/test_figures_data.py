@@ -670,8 +670,9 @@ def test_figure_s5_draws_every_tilt_at_both_samplings():
             tilt, share = line(panel(figure, "a"), name)
             assert_array_equal(tilt, [5, 20, 40])
             assert_array_equal(share, 100 * rows["share_always"])
-            for letter, quantity in (("b", "location"), ("c", "log2_sigma")):
-                rows = tables["figS5_precision"].query(f"{asked} and quantity == @quantity")
+            for letter, kind in (("b", "location"), ("c", "log2_sigma")):
+                rows = tables["figS5_precision"].query(asked)
+                rows = rows[rows["quantity"] == kind]
                 assert_array_equal(line(panel(figure, letter), name)[1], rows["mean"])
     with pytest.raises(InputError, match="no location above 0"):
         figs5.draw(

@@ -120,9 +120,7 @@ def test_a_tilted_view_integrates_the_blur_of_the_camera():
     weight = np.exp(-0.5 * near**2)
     weight /= weight.sum()
     for i, j in ((0, 0), (4, 7), (9, 11)):
-        y, x = to_reference(
-            spec, scene.shape, i + 0.9 * near[:, None], j + 0.9 * near[None, :]
-        )
+        y, x = to_reference(spec, scene.shape, i + 0.9 * near[:, None], j + 0.9 * near[None, :])
         seen = cosine_series.evaluate_at(scene.coefficients, y, x)
         assert weight @ seen @ weight == pytest.approx(view[i, j], abs=1e-8)
 

@@ -71,7 +71,9 @@ def test_soft_ends_lose_nothing_that_hard_ends_keep(seed, first):
     )
     hard, soft = (in_range(table, "sigma", SHAPE, 1.0, s, first, 3.0, 2.2) for s in (False, True))
     assert hard.equals(soft[compared(soft)].drop(columns="beyond"))
-    one, other = (new_and_lost(t, 6.0, 1.4, set_column="n_spo", sets=[3, 4, 5]) for t in (hard, soft))
+    one, other = (
+        new_and_lost(t, 6.0, 1.4, set_column="n_spo", sets=[3, 4, 5]) for t in (hard, soft)
+    )
     assert (one["n_detections"] == other["n_detections"]).all()
     for name in ("n_new", "n_lost"):
         assert (other[name].dropna() <= one[name].dropna()).all()

@@ -175,9 +175,7 @@ rule match_stated:
     input:
         views=ancient(files("views/{set}", plan.searches_of_sweep, "{sweep}")),
         views_digest=files("views/{set}.sha256", plan.searches_of_sweep, "{sweep}"),
-        extrema=files(
-            "keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"
-        ),
+        extrema=files("keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
         traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
     output:
         curves=f"{HERE}tables/{{sweep}}_curves.csv",
@@ -201,6 +199,7 @@ rule match_stated:
             name=of(plan.stated_key, "{sweep}"),
             values=column("value", plan.searches_of_sweep, "{sweep}"),
             starts=of(plan.octaves_of_sweep, "{sweep}"),
+            unit=setting("detector.sigma_min"),
         ),
     message:
         "Matching the keypoints of '{wildcards.sweep}' for {params.name} = {params.values}{params.scene}"

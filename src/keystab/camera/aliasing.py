@@ -116,5 +116,8 @@ def aliased_energy(
     plain = (camera[0], camera[1])
     all_parts = (*aliased_parts, (within[0], within[1]))
     return Aliasing(
-        total(plain, all_parts), total(plain, aliased_parts), of_dog(all_parts), of_dog(aliased_parts)
+        total(plain, all_parts),
+        total(plain, aliased_parts),
+        of_dog(all_parts),
+        of_dog(aliased_parts),
     )

@@ -3,9 +3,9 @@
 A reference picture stands for the scene. A camera of blur c that sees S reference pixels per pixel
 of its own takes the view obtained by blurring the reference by c S and sampling it every S
 reference pixels. Both are done on the cosine series of the reference, so that any blur, sub-pixel
-shift and non-integer zoom is exact; only rotations by other than quarter turns interpolate. Planes that are seen from the side have
-a blur that changes from place to place in the reference: the camera's Gaussian is then integrated
-in the view (`keystab.camera.perspective_views`).
+shift and non-integer zoom is exact; only rotations by other than quarter turns interpolate.
+Where a plane is seen from the side, the camera's Gaussian is integrated in the view
+(`keystab.camera.perspective_views`).
 """
 
 from __future__ import annotations
@@ -272,8 +272,8 @@ def _check_memory(scene: Scene, spec: ViewSpec) -> None:
     blur = spec.blur * spec.step
     rows, columns = (cosine_series.significant(n, blur) for n in scene.shape)
     height, width = spec.shape
-    bases = 3 * (height * rows + width * columns)
-    products = 3 * height * width + min(height * columns, width * rows)
+    bases = 3.0 * (height * rows + width * columns)
+    products = 3.0 * height * width + min(height * columns, width * rows)
     if spec.homography is not None and blur > 0:
         bases, products = 0, samples_of_view(scene.shape, spec)
     memory.require(

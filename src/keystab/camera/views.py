@@ -92,9 +92,9 @@ class ViewSpec:
         self._check_seed()
         if self.homography is not None:
             object.__setattr__(self, "homography", perspective.as_homography(self.homography))
-            self._check_horizon()
+            self._check_horizon(self.homography)
 
-    def _check_horizon(self) -> None:
+    def _check_horizon(self, homography: perspective.Homography) -> None:
         """Refuse a plane that ends within the view; its horizon is a line."""
         # The camera's Gaussian blur reaches a little beyond the outermost pixels.
         reach = 0.5 + perspective.REACH * self.blur
@@ -102,8 +102,8 @@ class ViewSpec:
             np.array([shift - n / 2 - reach, shift + n / 2 + reach])
             for n, shift in zip(self.shape, self.shift, strict=True)
         )
-        depth = perspective.homogeneous(self.homography, down[:, None], right[None, :])[2]
-        if not (depth > 1e-6 * np.abs(np.array(self.homography)).max()).all():
+        depth = perspective.homogeneous(homography, down[:, None], right[None, :])[2]
+        if not (depth > 1e-6 * np.abs(np.array(homography)).max()).all():
             raise InputError(
                 "homography: the view reaches the horizon of the plane; tilt it less, or give a "
                 "smaller shape"

@@ -1,4 +1,4 @@
-"""What section 3 to 6 of the paper say of the camera itself, without any keypoint.
+"""What sections 3 to 6 of the paper say of the camera itself, without any keypoint.
 
 The scene is its cosine series, so that a view, the scale-space of a view and the part of it that is
 aliased are finite sums: what the text states can be computed without sampling anything.
@@ -69,7 +69,7 @@ def aliasing_table(
 def wrong_blur_table(
     scene: Scene, spec: ViewSpec, assumed: Sequence[float], scales: Sequence[float]
 ) -> pd.DataFrame:
-    r"""Is the Gaussian scale-space under a wrong blur the right one, dilated along the scales?
+    r"""Hold the scale-space under a wrong blur against the right one, dilated along the scales.
 
     By the semigroup property (section 3.3) the scale-space of a view of blur c for which c' was
     assumed is, at :math:`\sigma`, that of the scene at :math:`\sqrt{\sigma^2 - c'^2 + c^2}`. The

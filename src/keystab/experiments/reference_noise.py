@@ -1,4 +1,4 @@
-"""Does the noise of the reference matter in views of it (section 4)?
+"""What the noise of the reference does to views of it (section 4).
 
 The paper calls its views noiseless, since each pixel of a view averages many of the reference. How
 much noise the reference has is not known, but as much again, and several times as much, can be
@@ -23,6 +23,7 @@ from keystab.experiments.first_view import against_first
 from keystab.matching.common_range import CommonRange
 from keystab.prediction.noise_level import estimated_noise
 from keystab.utils.random import random_generator
+
 
 def noise_seen(noise: float, blur: float, step: float) -> float:
     r"""Noise of a view of a noisy reference, in closed form.

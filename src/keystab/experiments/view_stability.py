@@ -18,6 +18,7 @@ from keystab.evaluation.intervals import BOTH, Purpose, normal_half_width, wilso
 from keystab.evaluation.localization import mean_localization
 from keystab.evaluation.stability import stability_curve
 from keystab.matching.common_range import CommonRange, compared
+from keystab.matching.correspondence import SPACE_TOLERANCE
 from keystab.matching.unique_keypoints import matches, minimum_unique_set
 
 Labels = Mapping[str, Any]
@@ -184,6 +185,7 @@ def scale_table(
     seen_by: float,
     labels: Labels,
     n_resamples: int,
+    unit: float = 0.0,
 ) -> pd.DataFrame:
     """Stability of one octave's keypoints against where it starts (figures 11 b, 12 c, d).
 
@@ -203,21 +205,32 @@ def scale_table(
         Columns to put before the others.
     n_resamples : int
         Of the bootstrap over keypoints and views.
+    unit : float
+        With a unit above 0, a second row per start, in pixels of the octave: as if it was an image
+        of its own that began at the scale `unit`, its space tolerance is longer by start / unit.
 
     Returns
     -------
     DataFrame
-        One row per start: `labels`; ``sigma_from``; ``n_unique``, of the octave; ``n_seen`` of
+        One row per start: `labels`; with a unit ``pixels_of``, "view" or "octave", and
+        ``space_tolerance`` in pixels of the view; ``sigma_from``; ``n_unique``, of the octave; ``n_seen`` of
         them, in at least ``seen_by`` of the views; ``percentage_seen`` with ``low, high``;
         ``mean_above``, keypoints per view at scales of at least ``sigma_from`` and without upper
         end, with ``low_above, high_above`` (1.96 standard errors over views).
     """
     rows = []
     n_views = len(everywhere.specs)
-    for start in starts:
+    limit = same.get("space_tolerance", SPACE_TOLERANCE)
+    kinds = [("view", [limit] * len(starts))]
+    if unit:
+        kinds.append(("octave", [limit * start / unit for start in starts]))
+    for kind, start, tolerance in (
+        (kind, *pair) for kind, limits in kinds for pair in zip(starts, limits, strict=True)
+    ):
         field = (everywhere.specs, everywhere.reference_shape, everywhere.margin)
         octave = CommonRange(*field, start, 2 * start, everywhere.soft)
-        matched = keypoints_of_views(octave.common(detections), n_views, same)
+        how = {**same, "space_tolerance": tolerance}
+        matched = keypoints_of_views(octave.common(detections), n_views, how)
         curve = stability_curve(
             matched.seen,
             [100 * seen_by],
@@ -229,6 +242,7 @@ def scale_table(
         error = normal_half_width(per_view)
         rows.append(
             {
+                **({"pixels_of": kind, "space_tolerance": tolerance} if unit else {}),
                 "sigma_from": start,
                 "n_unique": len(matched.found),
                 "seen_by": seen_by,

@@ -1,4 +1,4 @@
-r"""Are true extrema invariant to zoom-outs, as section 3.2 of the paper proves?
+r"""The invariance of true extrema to zoom-outs, which section 3.2 of the paper proves.
 
 The theorem: with a known Gaussian blur and well sampled views, an extremum at scale
 :math:`\sigma_1` of one view is an extremum at :math:`\sigma_2` of the other with
@@ -94,8 +94,8 @@ def zoom_table(
     Returns
     -------
     DataFrame
-        One row per view but the first: `labels`; ``zoom``; of the ``n_first`` extrema of the first view the
-        share ``share_found`` with an extremum of the same sign nearer than the limits of equation
+        One row per view but the first: `labels`; ``zoom``; of the ``n_first`` extrema of the first
+        view the share ``share_found`` with an extremum of the same sign nearer than the limits of equation
         22, with its 95 % Wilson interval ``low_found, high_found``; of the nearest ones
         ``scale_residual``, the median of :math:`|\mu \sigma_2 / \lambda \sigma_1 - 1|`, and
         ``location_residual``, that of the distance over :math:`\sigma_1`; ``q95_scale,
@@ -146,5 +146,7 @@ def zoom_table(
 
 
 def _residuals(name: str, values: NDArray[np.float64]) -> dict[str, float]:
-    ends = zip((f"q95_{name}", f"low_{name}", f"high_{name}"), rank_interval(values, 0.95), strict=True)
+    ends = zip(
+        (f"q95_{name}", f"low_{name}", f"high_{name}"), rank_interval(values, 0.95), strict=True
+    )
     return {f"{name}_residual": rank_interval(values)[0], **dict(ends)}

@@ -59,7 +59,7 @@ SHIFTS: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
-    """Draw the keypoints kept, and the shift of their scale, against the error of the blur and zoom.
+    """Draw the keypoints kept, and the shift of their scale, against blur and zoom.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
 
 def _lines(table: DataFrame) -> list[tuple[DataFrame, str, object, str]]:
     """Rows, name, dashes and colour of each line: of each sampling and kind of detection."""
-    found = []
+    found: list[tuple[DataFrame, str, object, str]] = []
     finest = table["n_spo"].max()
     for n_spo in sorted(table["n_spo"].unique()):
         for detections, colour in palette.DETECTION_COLOURS.items():

@@ -7,9 +7,9 @@ border of the image moves with the sampling. Comparisons therefore keep to a com
 and away from the border. The paper cuts the range at its lower end only; an upper end is optional
 here.
 
-A keypoint near an end of the range may lie within it in one sampling and beyond in the next. With hard
-ends, as in the paper, it is then lost; with soft ends counterparts may lie beyond as well, and a
-column ``beyond`` of the detections says which are there as counterparts only.
+A keypoint near an end of the range may lie within it in one sampling and beyond in the next. With
+hard ends, as in the paper, it is then lost; with soft ends counterparts may lie beyond as well, and
+a column ``beyond`` of the detections says which are there as counterparts only.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from keystab.camera.common_field import (
     zoom_to_common_frame,
 )
 from keystab.camera.views import ViewSpec
-
 
 BEYOND = "beyond"
 """Column of detections that are counterparts and not themselves compared; absent with hard ends."""
@@ -124,9 +123,7 @@ def in_range(
     DataFrame
         Some rows of `detections`, with the column ``beyond`` where ends are soft.
     """
-    kept = comparable(
-        detections, shape, sigma_min, first_scale, border, scale_column, last_scale
-    )
+    kept = comparable(detections, shape, sigma_min, first_scale, border, scale_column, last_scale)
     if not soft_ends:
         return detections[kept]
     near = comparable(detections, shape, 0.0, 1.0, border, scale_column)

@@ -58,6 +58,7 @@ Comparison
     curve_n_spo : samplings whose curves are drawn
     iterations : further values of N_interp
     tilts : tilt of each view, where those of one tilt are matched by themselves
+    unit : first scale of the octave in whose pixels others are compared too; 0 for none
     pairs : table of what becomes of the keypoints of the first view in the others
     interpolation : table of how stable the interpolation is
     dead : table of what is detected less than half a step above the first scale

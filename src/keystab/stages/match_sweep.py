@@ -20,6 +20,7 @@ def main(
     n_resamples: int,
     octaves: Octaves | None = None,
     n_spo: Sequence[int] = (),
+    unit: float = 0.0,
     soft_ends: bool = False,
     *,
     curves: Path,
@@ -48,24 +49,23 @@ def main(
         raise InputError("--starts, --seen-by and --scales go together: give all or none")
     curve_tables, count_tables, scale_tables, pair_tables, row_tables = [], [], [], [], []
     numbers = [{"n_spo": n} for n in n_spo] or [{}] * len(values)
-    for value, number, store, *paths in zip(values, numbers, views, extrema, traces, strict=True):
+    paths = zip(extrema, traces, strict=True)
+    for value, number, store, files in zip(values, numbers, views, paths, strict=True):
         seen = read_views(*store)
         everywhere, labels = common_range(seen, compared, soft_ends), {name: value, **number}
-        tables = [read_table(path) for path in paths]
-        keypoints = refined_keypoints(*tables, **vars(accepted))
+        discrete, models = (read_table(path) for path in files)
+        keypoints = refined_keypoints(discrete, models, **vars(accepted))
         matched = keypoints_of_views(everywhere.common(keypoints), len(seen), vars(same))
         curve_tables.append(curve_table(matched, labels, n_resamples))
         count_tables.append(count_table(matched, labels))
         if octaves:
-            starts, seen_by = octaves.starts, octaves.seen_by
-            scale_tables.append(
-                scale_table(keypoints, everywhere, starts, vars(same), seen_by, labels, n_resamples)
-            )
+            how = (octaves.starts, vars(same), octaves.seen_by, labels, n_resamples, unit)
+            scale_tables.append(scale_table(keypoints, everywhere, *how))
         if pairs:
             pair_tables.append(against_first(keypoints, everywhere, vars(same), labels))
         if interpolation:
-            limits = vars(accepted)
-            row_tables.append(interpolation_table(*tables, everywhere, limits, vars(same), labels))
+            how = (vars(accepted), vars(same), labels)
+            row_tables.append(interpolation_table(discrete, models, everywhere, *how))
     write_joined(curve_tables, curves)
     for joined, path in ((scale_tables, scales), (pair_tables, pairs), (row_tables, interpolation)):
         if path:
