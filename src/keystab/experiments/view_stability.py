@@ -213,7 +213,8 @@ def scale_table(
     -------
     DataFrame
         One row per start: `labels`; with a unit ``pixels_of``, "view" or "octave", and
-        ``space_tolerance`` in pixels of the view; ``sigma_from``; ``n_unique``, of the octave; ``n_seen`` of
+        ``space_tolerance`` in pixels of the view; ``sigma_from``; ``n_unique``, of the octave;
+        ``n_seen`` of
         them, in at least ``seen_by`` of the views; ``percentage_seen`` with ``low, high``;
         ``mean_above``, keypoints per view at scales of at least ``sigma_from`` and without upper
         end, with ``low_above, high_above`` (1.96 standard errors over views).

@@ -95,8 +95,8 @@ def zoom_table(
     -------
     DataFrame
         One row per view but the first: `labels`; ``zoom``; of the ``n_first`` extrema of the first
-        view the share ``share_found`` with an extremum of the same sign nearer than the limits of equation
-        22, with its 95 % Wilson interval ``low_found, high_found``; of the nearest ones
+        view the share ``share_found`` with an extremum of the same sign nearer than the limits of
+        equation 22, with its 95 % Wilson interval ``low_found, high_found``; of the nearest ones
         ``scale_residual``, the median of :math:`|\mu \sigma_2 / \lambda \sigma_1 - 1|`, and
         ``location_residual``, that of the distance over :math:`\sigma_1`; ``q95_scale,
         q95_location``, the quantiles of 95 %, with 95 % intervals by ranks ``low_scale, high_scale,
