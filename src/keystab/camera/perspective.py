@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keystab.errors import InputError
-from keystab.utils import validation
 
 Homography = tuple[tuple[float, float, float], ...]
 """Three rows of three numbers; tuples, so that views can be compared."""
@@ -62,10 +61,12 @@ def tilted(tilt: float, azimuth: float, focal_length: float) -> Homography:
     >>> to_plane(tilted(60.0, 0.0, 1000.0), 0.0, 1.0)[1].round(3).item()
     2.003
     """
-    if validation.number("tilt", tilt, least=0) >= 90:
-        raise InputError(f"tilt is {tilt:g}, allowed are degrees below 90: the plane is not seen")
-    validation.number("azimuth", azimuth)
-    validation.number("focal_length", focal_length, above=0)
+    if not 0 <= tilt < 90:
+        raise InputError(f"tilt is {tilt:g}, allowed are degrees from 0 to below 90: change it")
+    if not math.isfinite(azimuth):
+        raise InputError(f"azimuth is {azimuth}, allowed is a finite number of degrees: change it")
+    if not 0 < focal_length < math.inf:
+        raise InputError(f"focal_length is {focal_length}, allowed are pixels above 0: change it")
     theta, turn = math.radians(tilt), math.radians(azimuth)
     cos, sin = math.cos(theta), math.sin(theta)
     down, right = math.sin(turn), math.cos(turn)
