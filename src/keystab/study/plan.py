@@ -64,11 +64,11 @@ FIGURES = {
     # a wrong blur, by its sign
     "figS2": Figure(("figS2.csv", "blur_zooms_pairs.csv")),
     # the blur of a real camera
-    "figS3": Figure(("figS3.csv", "figS3_profiles.csv", "figS3_ranges.csv"), of_scene=False),
+    "figS3": Figure(("figS3.csv", "figS3_profiles.csv"), of_scene=False),
     # blobs, whose scale is known
     "figS4": Figure(("figS4.csv",), of_scene=False),
     # stability and precision when the scene is seen from the side
-    "figS5": Figure(("figS5_counts.csv", "figS5_curves.csv", "figS5_precision.csv"), "tilts"),
+    "figS5": Figure(("figS5_counts.csv", "figS5_precision.csv"), "tilts"),
     # why extrema come and go at any density
     "floor": Figure(("floor_rates.csv", "floor_summary.csv", "floor_variants.csv")),
     # detections against the true extrema
@@ -107,6 +107,9 @@ STATED_SWEEPS = {"blur_zooms": "assumed_blur", "unbalanced": "delta_min", "large
 
 TABLES_NOT_DRAWN = ("fig5_features.csv", "refinement.csv")
 """Tables of a scene that no figure draws and no claim needs."""
+
+TABLES_OF_THEORY = ("figS3_ranges.csv",)
+"""Tables of no scene that no figure draws and claims need."""
 
 TABLES_OF_SCENES = ("predictors_detections.parquet",)
 """The same, of several scenes together."""
@@ -464,6 +467,7 @@ def table_files(place: str, results: str, names: Iterable[str]) -> list[str]:
     ['results/tables/fig1.csv', 'results/scenes/stream/tables/fig3.csv']
     """
     once = {table for figure in FIGURES.values() if not figure.of_scene for table in figure.tables}
+    once |= set(TABLES_OF_THEORY)
     return [f"{results}/{'' if name in once else place}tables/{name}" for name in names]
 
 
