@@ -17,8 +17,13 @@ from keystab.experiments.dead_range import dead_range_row
 from keystab.experiments.first_view import against_first
 from keystab.experiments.interpolation_stability import interpolation_table, rank_interval
 from keystab.experiments.reference_noise import noise_seen, reference_noise_table
+from keystab.experiments.view_stability import scale_table
 from keystab.experiments.zoom_invariance import zoom_table, zoomed_views
+from keystab.io.checksums import write_checksums
+from keystab.io.pictures import write_picture
+from keystab.io.view_store import write_views
 from keystab.matching.common_range import CommonRange
+from keystab.stages import view_statements
 from keystab.truth.true_extrema import true_extrema
 
 
@@ -194,3 +199,43 @@ def test_accepted_extrema_and_the_spread_of_their_positions_are_counted():
     assert (row["n_spo"], row["n_extrema"], row["n_accepted"], row["n_keypoints"]) == (3, 4, 3, 1)
     assert row["condition"] == pytest.approx(4.0) and row["share_accepted"] == 0.75
     assert row["spread"] == pytest.approx(0.2 / math.sqrt(2))
+
+
+def test_octaves_are_compared_in_pixels_of_the_view_and_in_their_own():
+    # Two views in which a keypoint of the second octave lies 1.5 pixels apart.
+    table = pd.DataFrame({"view": [0, 1], "y": [30.0, 31.5], "x": [30.0, 30], "sigma": [5.0, 5]})
+    rows = scale_table(table, views(2), [2.0, 4.0], {}, 0.7, {}, 100, unit=2.0)
+    assert rows["pixels_of"].tolist() == ["view", "view", "octave", "octave"]
+    assert rows["space_tolerance"].tolist() == [1.0, 1.0, 1.0, 2.0]
+    assert rows["n_unique"].tolist() == [0, 2, 0, 1] and rows["n_seen"].tolist() == [0, 0, 0, 1]
+    plain = scale_table(table, views(2), [2.0, 4.0], {}, 0.7, {}, 100)
+    assert "pixels_of" not in plain and plain.equals(rows.iloc[:2][plain.columns])
+
+
+@pytest.mark.slow
+def test_the_stage_writes_a_table_for_each_question(tmp_path):
+    scene = np.random.default_rng(1).random((300, 360))
+    write_picture(scene / scene.max(), tmp_path / "scene.tif")
+    spec = ViewSpec(1.1, 3.0, (100, 120))
+    store = {"set": "still", "reference_blur": 0.0, "reference_shape": list(scene.shape)}
+    write_views([simulate(scene, spec)], [spec], tmp_path / "views", store)
+    write_checksums(tmp_path / "views", tmp_path / "views.sha256")
+    tables = {
+        name: tmp_path / f"{name}.csv" for name in ("aliasing", "wrong_blur", "zoomed", "noisy")
+    }
+    arguments = [
+        *("--reference", str(tmp_path / "scene.tif"), "--views", str(tmp_path / "views")),
+        *("--views-digest", str(tmp_path / "views.sha256"), "--n-spo", "3"),
+        *("--sigma-min", "1.1", "--kappa", "1.26", "--oversampling", "spline", "--epsilon", "0.0"),
+        *("--max-offset", "0.6", "--max-iterations", "2", "--scale-moves", "True"),
+        *("--move", "nearest", "--border", "3.0", "--first-scale", "1.26", "--last-scale", "None"),
+        *("--space-tolerance", "1.0", "--scale-ratio", "1.4", "--match-sign", "False"),
+        *("--camera-blurs", "0.5", "1.1", "--assumed-blurs", "0.7", "--zooms", "1.25"),
+        *("--kappas", "1.26", "--noise-factors", "1.0"),
+        *(text for name, path in tables.items() for text in (f"--{name.replace('_', '-')}", str(path))),
+    ]  # fmt: skip
+    assert view_statements.main(arguments) == 0
+    found = {name: pd.read_csv(path) for name, path in tables.items()}
+    assert found["aliasing"]["blur"].tolist() == [0.5, 1.1]
+    assert found["wrong_blur"]["sigma"].tolist() == [1.1, 2.2]
+    assert found["zoomed"]["zoom"].tolist() == [1.25] and found["noisy"]["factor"].tolist() == [1.0]
