@@ -64,8 +64,8 @@ def main(
         if pairs:
             pair_tables.append(against_first(keypoints, everywhere, vars(same), labels))
         if interpolation:
-            how = (vars(accepted), vars(same), labels)
-            row_tables.append(interpolation_table(discrete, models, everywhere, *how))
+            asked = (vars(accepted), vars(same), labels)
+            row_tables.append(interpolation_table(discrete, models, everywhere, *asked))
     write_joined(curve_tables, curves)
     for joined, path in ((scale_tables, scales), (pair_tables, pairs), (row_tables, interpolation)):
         if path:
