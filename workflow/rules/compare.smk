@@ -42,6 +42,7 @@ rule match_views:
             max_offsets=of(plan.further_limits, "{figure}", "max_offsets"),
             iterations=of(plan.further_limits, "{figure}", "max_iterations"),
             curve_n_spo=of(plan.curve_n_spo, "{figure}"),
+            last_scale=of(plan.last_scale_of_figure, "{figure}"),
             tilts=of(plan.tilts, "{figure}"),
         ),
     message:
@@ -170,49 +171,23 @@ use rule match_aliasing as match_sweep with:
         ),
 
 
-rule match_stated:
-    """Keypoints under noise and a wrong blur at once, over five octaves (section 4)."""
+rule match_blur_zooms:
+    """Figure S2: keypoints of the first view in those at other zooms, under right and wrong blurs."""
     input:
         views=ancient(files("views/{set}", plan.searches_of_sweep, "{sweep}")),
         views_digest=files("views/{set}.sha256", plan.searches_of_sweep, "{sweep}"),
-        extrema=files("keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
+        extrema=files(
+            "keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"
+        ),
         traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
     output:
         curves=f"{HERE}tables/{{sweep}}_curves.csv",
         counts=f"{HERE}tables/{{sweep}}_counts.csv",
-        scales=f"{HERE}tables/{{sweep}}_octaves.csv",
+        pairs=f"{HERE}tables/{{sweep}}_pairs.csv",
     log:
         f"{LOG}match_stated/{{sweep}}.log",
     benchmark:
         f"{BENCHMARK}match_stated/{{sweep}}.tsv"
-    wildcard_constraints:
-        sweep="large_scales",
-    params:
-        **stage(
-            "match_sweep",
-            parameters.ComparedInViews,
-            parameters.Same,
-            "comparison.soft_ends",
-            parameters.Acceptance,
-            parameters.Octaves,
-            "stability.n_resamples",
-            name=of(plan.stated_key, "{sweep}"),
-            values=column("value", plan.searches_of_sweep, "{sweep}"),
-            starts=of(plan.octaves_of_sweep, "{sweep}"),
-            unit=setting("detector.sigma_min"),
-        ),
-    message:
-        "Matching the keypoints of '{wildcards.sweep}' for {params.name} = {params.values}{params.scene}"
-    shell:
-        "{params.command} >{log:q} 2>&1"
-
-
-use rule match_stated as match_blur_zooms with:
-    # Figure S2: keypoints of the first view in those at other zooms, under right and wrong blurs.
-    output:
-        curves=f"{HERE}tables/{{sweep}}_curves.csv",
-        counts=f"{HERE}tables/{{sweep}}_counts.csv",
-        pairs=f"{HERE}tables/{{sweep}}_pairs.csv",
     wildcard_constraints:
         sweep="blur_zooms",
     params:
@@ -223,12 +198,17 @@ use rule match_stated as match_blur_zooms with:
             "comparison.soft_ends",
             parameters.Acceptance,
             "stability.n_resamples",
+            last_scale=of(plan.last_scale, "{sweep}"),
             name=of(plan.stated_key, "{sweep}"),
             values=column("value", plan.searches_of_sweep, "{sweep}"),
         ),
+    message:
+        "Matching the keypoints of '{wildcards.sweep}' for {params.name} = {params.values}{params.scene}"
+    shell:
+        "{params.command} >{log:q} 2>&1"
 
 
-use rule match_stated as match_unbalanced with:
+use rule match_blur_zooms as match_unbalanced with:
     # How stable interpolation is at balanced and at unbalanced samplings (caption of figure 3).
     output:
         curves=f"{HERE}tables/{{sweep}}_curves.csv",
@@ -244,9 +224,35 @@ use rule match_stated as match_unbalanced with:
             "comparison.soft_ends",
             parameters.Acceptance,
             "stability.n_resamples",
+            last_scale=of(plan.last_scale, "{sweep}"),
             name=of(plan.stated_key, "{sweep}"),
             values=column("value", plan.searches_of_sweep, "{sweep}"),
             n_spo=column("n_spo", plan.searches_of_sweep, "{sweep}"),
+        ),
+
+
+use rule match_blur_zooms as match_large_scales with:
+    # Keypoints under noise and a wrong blur at once, over four octaves (section 4).
+    output:
+        curves=f"{HERE}tables/{{sweep}}_curves.csv",
+        counts=f"{HERE}tables/{{sweep}}_counts.csv",
+        scales=f"{HERE}tables/{{sweep}}_octaves.csv",
+    wildcard_constraints:
+        sweep="large_scales",
+    params:
+        **stage(
+            "match_sweep",
+            parameters.ComparedInViews,
+            parameters.Same,
+            "comparison.soft_ends",
+            parameters.Acceptance,
+            parameters.Octaves,
+            "stability.n_resamples",
+            last_scale=of(plan.last_scale, "{sweep}"),
+            name=of(plan.stated_key, "{sweep}"),
+            values=column("value", plan.searches_of_sweep, "{sweep}"),
+            starts=of(plan.octaves_of_sweep, "{sweep}"),
+            unit=setting("detector.sigma_min"),
         ),
 
 

@@ -21,7 +21,7 @@ from keystab.camera.views import effective_blur
 from keystab.errors import InputError
 from keystab.io.pictures import picture_shape
 from keystab.scalespace.sampling import Sampling, balanced_delta
-from keystab.study.plan import kept_n_spo
+from keystab.study.plan import kept_n_spo, last_scale
 from keystab.study.scenes import further_pictures
 from keystab.utils.memory import in_words
 
@@ -72,7 +72,7 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
         for name, views in settings["sets"].items()
         for line in fit_problems(name, views, shape, border)
     ]
-    if len(problems) == len(settings["sets"]):  # not the sets are to blame
+    if 2 * len(problems) > len(settings["sets"]):  # not the sets are to blame
         of_border = _border_problems(settings["sets"], shape, border)
         if of_border:
             return of_border
@@ -157,7 +157,7 @@ def common_problems(
         ]
     margin = max(views["guard"], comparison["border"])
     zooms = zooms_in_common_field(specs, reference_shape, margin)
-    ends = (comparison["first_scale"], comparison["last_scale"])
+    ends = (comparison["first_scale"], last_scale(settings, name))
     low, high = common_scales(specs, sigma_min, views["n_oct"], *ends, zooms)
     if low >= high:
         return [

@@ -186,6 +186,22 @@ def stated_key(_settings: Settings, sweep: str) -> str:
     return STATED_SWEEPS[sweep]
 
 
+def last_scale(settings: Settings, name: str) -> float | None:
+    """Upper end of the scales that are compared in a set or a sweep of sets, over its first scale.
+
+    Where views see the scene at zooms that differ by much, or large octaves are asked for, that is
+    the end of their octaves, whatever that of other comparisons is.
+    """
+    to_the_end = name.startswith(("tilts", "blur_zooms", "large_scales"))
+    end: float | None = None if to_the_end else settings["comparison"]["last_scale"]
+    return end
+
+
+def last_scale_of_figure(settings: Settings, figure: str) -> float | None:
+    """Such an end for the set of views that a figure studies."""
+    return last_scale(settings, sets_of_figure(settings, figure)[0])
+
+
 def octaves_of_sweep(settings: Settings, sweep: str) -> list[float]:
     """First scales of the octaves in which the sets of a sweep are searched."""
     views = settings["sets"][next(iter(settings["sweeps"][sweep]))]
