@@ -176,9 +176,7 @@ rule match_blur_zooms:
     input:
         views=ancient(files("views/{set}", plan.searches_of_sweep, "{sweep}")),
         views_digest=files("views/{set}.sha256", plan.searches_of_sweep, "{sweep}"),
-        extrema=files(
-            "keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"
-        ),
+        extrema=files("keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
         traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
     output:
         curves=f"{HERE}tables/{{sweep}}_curves.csv",
