@@ -10,14 +10,14 @@ sampling of the scale-space, no refinement and no tolerance stands between them 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.camera.simulation import whole_shape
+from keystab.camera.simulation import Scene, simulate, whole_shape
 from keystab.camera.views import ViewSpec
 from keystab.evaluation.intervals import wilson_interval
 from keystab.experiments.interpolation_stability import rank_interval
@@ -75,6 +75,47 @@ def zoomed_views(
     everywhere = CommonRange(specs, reference_shape, float(margin), low, 2 * low)
     ratios = [view.step / spec.step for view in specs]
     return everywhere, [(low / _BEYOND / r, 2 * low * _BEYOND / r) for r in ratios]
+
+
+ExtremaOf = Callable[[NDArray[np.float64], float, float, float, float], pd.DataFrame]
+"""True extrema of an image: its blur, first and last scale, ratio of the two blurs."""
+
+
+def zoomed_truth(
+    scene: Scene,
+    spec: ViewSpec,
+    zooms: Sequence[float],
+    kappas: Sequence[float],
+    sigma_min: float,
+    extrema_of: ExtremaOf,
+) -> pd.DataFrame:
+    """Find the true extrema of zoomed views, and hold them against each other.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the camera looks at.
+    spec, zooms, sigma_min
+        See `zoomed_views`.
+    kappas : sequence of float
+        Ratios of the two blurs, one after the other.
+    extrema_of : callable
+        Finds the true extrema of an image, `keystab.true_extrema`.
+
+    Returns
+    -------
+    DataFrame
+        ``kappa`` and the columns of `zoom_table`.
+    """
+    tables = []
+    for kappa in kappas:
+        everywhere, ends = zoomed_views(spec, zooms, scene.shape, sigma_min, kappa)
+        true = [
+            extrema_of(simulate(scene, view), view.blur, low, high, kappa)
+            for view, (low, high) in zip(everywhere.specs, ends, strict=True)
+        ]
+        tables.append(zoom_table(true, everywhere, {"kappa": kappa}))
+    return pd.concat(tables, ignore_index=True)
 
 
 def zoom_table(
