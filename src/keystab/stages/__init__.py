@@ -60,6 +60,8 @@ Comparison
     minimum_share : least share of the views that see a keypoint whose precision counts
     curves : table of curves of stability
     precision : table of precisions
+    differences : table of what two choices of keypoints differ by
+    edges : table of spreads along edges and across
     scales : table of counts against scale
     border : pixels left out at the border of the view
     assumed_blur : camera blur that was assumed, pixels

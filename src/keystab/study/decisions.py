@@ -1,10 +1,11 @@
 r"""Whether criteria hold of numbers that are known up to intervals.
 
 Each comparison of a criterion is turned into a margin, positive where it holds. Its interval comes
-from those of the numbers in it, moved to their ends one at a time: with d_i the change of the margin
-m by the i-th of them,
+from those of the numbers in it, moved to their ends one at a time. With :math:`d_i` the change of
+the margin m by the i-th of them, at its worse and at its better end, it runs from
 
-.. math:: m - \sqrt{\textstyle\sum_i \min(d_i, 0)^2} \le m \le m + \sqrt{\textstyle\sum_i \max(d_i, 0)^2}
+.. math:: m - \sqrt{\textstyle\sum_i \min(d_i, 0)^2}
+          \quad\text{to}\quad m + \sqrt{\textstyle\sum_i \max(d_i, 0)^2}
 
 For a difference of two shares with Wilson intervals that is Newcombe's interval, in general the
 method of variance estimates recovery (Zou and Donner 2008). It takes the numbers as independent:

@@ -189,6 +189,17 @@ def searches_of_figure(settings: Settings, figure: str) -> list[Searched]:
     return searches(settings, *sets_of_figure(settings, figure))
 
 
+def scales_of_zooms(settings: Settings, end: int) -> float:
+    """One end of the range of scales that all views of figure 8 cover, over their first scale."""
+    views, comparison = settings["sets"]["zooms"], settings["comparison"]
+    zooms = [step / views["step"][0] for step in views["step"]]
+    ends = (
+        max(zooms) * comparison["first_scale"],
+        comparison["last_scale"] or 2.0 ** views["n_oct"],
+    )
+    return float(ends[end])
+
+
 def compared_with_scene(settings: Settings) -> list[Searched]:
     """Sets held against the scene as the view ``still`` sees it: first views of the same step."""
     sets = settings["sets"]
@@ -426,6 +437,7 @@ def table_files(place: str, results: str, names: Iterable[str]) -> list[str]:
     ['results/tables/fig1.csv', 'results/scenes/stream/tables/fig3.csv']
     """
     once = {table for figure in FIGURES.values() if not figure.of_scene for table in figure.tables}
+    once |= {"fig1_samplings.csv"}
     return [f"{results}/{'' if name in once else place}tables/{name}" for name in names]
 
 

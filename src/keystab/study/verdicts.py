@@ -156,9 +156,7 @@ def measured(quantity: Quantity, tables: Mapping[str, pd.DataFrame]) -> Measured
     row = int(np.argmax(order) if how in ("last", "max") else np.argmin(order))
     extreme = how if how in ("max", "min") else ""
     low, high = (float(end[row]) for end in ends)
-    return Measured(
-        float(numbers[row]), low, high, "", extreme, len(numbers) if extreme else 1
-    )
+    return Measured(float(numbers[row]), low, high, "", extreme, len(numbers) if extreme else 1)
 
 
 def _ends(quantity: Quantity, columns: Mapping[str, Any], n_rows: int) -> list[NDArray[np.float64]]:
@@ -182,8 +180,8 @@ def _step(
     )
     pair = {"a": Known(numbers[row], low[row], high[row])}
     pair["b"] = Known(numbers[row + 1], low[row + 1], high[row + 1])
-    ends = interval_of("b - a", pair)
-    return Measured(float(steps[row]), *map(float, ends), "", extreme, len(steps))
+    below, above = interval_of("b - a", pair)
+    return Measured(float(steps[row]), below, above, "", extreme, len(steps))
 
 
 def _share(holds: NDArray[np.float64], by: NDArray[Any]) -> tuple[float, float, float]:
@@ -274,7 +272,8 @@ def _known(claim: Claim, found: Mapping[str, Measured]) -> dict[str, Known]:
     return {
         part.name: Known(
             found[part.name].value,
-            *(found[part.name][1:3] if not part.expression else ()),
+            low=math.nan if part.expression else found[part.name].low,
+            high=math.nan if part.expression else found[part.name].high,
             extreme=found[part.name].extreme,
             chosen_from=found[part.name].chosen_from,
             expression=part.expression,

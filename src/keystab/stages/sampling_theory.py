@@ -1,0 +1,17 @@
+"""What samplings of a scale-space mean for its Gaussians, without a picture (section 5.1)."""
+
+from pathlib import Path
+
+from keystab.parameters import Scales, Semigroup, SiftSampling
+from keystab.stages._command import command
+
+
+@command
+def main(
+    n_spo: list[int], scales: Scales, sift: SiftSampling, semigroup: Semigroup, *, table: Path
+) -> None:
+    """Write a table of the blurs that samplings add, and of how much their steps change."""
+    from keystab.experiments import sampling_theory
+    from keystab.io.tables import write_table
+
+    write_table(sampling_theory.sampling_theory(n_spo, scales, sift, semigroup), table)
