@@ -1,7 +1,7 @@
 r"""What scales mean for Gaussians and noise, without a picture (sections 2.2, 5.1 and 6.3).
 
-Two things are asked of samplings. How much blur is added from one scale to the next, in
-samples, and does a sampled kernel of that width still blur as a Gaussian does? And do its steps in scale and
+Two things are asked of samplings. How much blur is added from one scale to the next, in samples,
+and does a sampled kernel of that width still blur as a Gaussian does? And do its steps in scale and
 in space change a Gaussian by as much (equation 23)?
 """
 

@@ -35,8 +35,8 @@ QUANTITIES = (
     "relative_n_always",
 )
 """What is compared: the share of unique keypoints seen in all views, the mean share of the views
-that see a keypoint, the share seen in less than `UNSTABLE` of them; by what share the first, and the
-number seen in all, is larger than the other's."""
+that see a keypoint, the share seen in less than `UNSTABLE` of them; and by what share the first,
+and the number seen in all, is larger than the other's."""
 
 
 class Choice(NamedTuple):
@@ -67,16 +67,17 @@ def pairs_of_choices(choices: Sequence[Choice], usual: tuple[float, float]) -> l
     Returns
     -------
     list of Pair
-        Every other choice against the ``usual`` refinement at the same sampling, and at the
-        ``fine`` sampling, the finest; and other numbers of interpolations against ``two`` with the
-        same offset.
+        Every other choice against the ``usual`` refinement at the same sampling, against the
+        ``usual at N``, the finest sampling; and other numbers of interpolations against ``two``
+        with the same offset.
     """
     named = {_name(choice.labels): choice for choice in choices}
     finest = max((choice.labels["n_spo"] for choice in choices), default=0)
     pairs = []
     for name, one in named.items():
         n_spo, detections, max_offset, max_iterations = name
-        others = {"usual": (n_spo, "refined", *usual), "fine": (finest, "refined", *usual)}
+        others = {f"usual at {finest}": (finest, "refined", *usual)}
+        others["usual"] = (n_spo, "refined", *usual)
         if detections == "refined" and max_iterations != 2:
             others["two"] = (n_spo, "refined", max_offset, 2)
         pairs += [

@@ -125,9 +125,9 @@ def interval_of(expression: str, numbers: Mapping[str, Known]) -> tuple[float, f
     [3.0, 4.0]
     """
     names = names_of(expression)
-    below, above, _ = _moved(lambda values: evaluate(expression, values), numbers, names)
-    if not (below or above):
+    if all(math.isnan(numbers[name].low) for name in _measured_in(names, numbers)):
         return math.nan, math.nan
+    below, above, _ = _moved(lambda values: evaluate(expression, values), numbers, names)
     middle = float(evaluate(expression, _values(numbers, {})))
     return middle - below, middle + above
 
