@@ -296,18 +296,6 @@ class AuditPlan:
 
 
 @dataclass(frozen=True)
-class SiftSampling:
-    """Where SIFT as shipped samples its scale-space (section 2.2)."""
-
-    sigma_min_of_sift: Annotated[
-        float, Setting("sets.shipped.sigma_min", "first scale of SIFT as shipped, pixels")
-    ]
-    delta_min_of_sift: Annotated[
-        float, Setting("sets.shipped.delta_min", "sampling step of SIFT as shipped, pixels")
-    ]
-
-
-@dataclass(frozen=True)
 class Semigroup:
     """A blob blurred many times by little, and once by much (figure 1)."""
 

@@ -29,7 +29,7 @@ from keystab.experiments.view_differences import (
     pairs_of_choices,
 )
 from keystab.experiments.view_stability import MatchedViews
-from keystab.parameters import Scales, Semigroup, SiftSampling
+from keystab.parameters import Scales, Semigroup
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
 rng = np.random.default_rng(17)
@@ -306,8 +306,8 @@ def test_distances_of_kernels_are_those_of_their_densities():
 
 
 def test_blur_added_falls_with_n_spo_at_a_fixed_step_and_rises_on_balanced_grids():
-    sift, blurs = SiftSampling(0.8, 0.5), Semigroup(1.1, 10, 0.1, 1.5, 57, 4.0)
-    table = sampling_theory([3, 9, 19], Scales(1.1, 2 ** (1 / 3)), sift, blurs)
+    blurs = Semigroup(1.1, 10, 0.1, 1.5, 57, 4.0)
+    table = sampling_theory([3, 9, 19], Scales(1.1, 2 ** (1 / 3)), (0.8, 0.5), blurs)
     fixed, balanced = (table[table["grid"] == grid] for grid in ("sift", "balanced"))
     assert (np.diff(fixed["increment"]) < 0).all() and (np.diff(balanced["increment"]) > 0).all()
     assert fixed["increment"].iloc[0] == pytest.approx(1.6 * math.sqrt(2 ** (2 / 3) - 1))

@@ -37,8 +37,9 @@ rule sampling_theory:
             "sampling_theory",
             "samplings.n_spo",
             parameters.Scales,
-            parameters.SiftSampling,
             parameters.Semigroup,
+            sift_sigma_min=setting("sets.shipped.sigma_min"),
+            sift_delta_min=setting("sets.shipped.delta_min"),
         ),
     message:
         "Comparing the blurs and the steps of the samplings n_spo = {params.n_spo}"

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from keystab.experiments.semigroup_table import semigroup_table
-from keystab.parameters import Scales, Semigroup, SiftSampling
+from keystab.parameters import Scales, Semigroup
 from keystab.scalespace.sampling import balanced_delta
 from keystab.scalespace.white_noise import dog_noise, gaussian_noise
 
@@ -69,7 +69,7 @@ def kernel_distances(sigma: float, step: float, aside: float) -> dict[str, float
 
 
 def sampling_theory(
-    n_spo: Sequence[int], scales: Scales, sift: SiftSampling, semigroup: Semigroup
+    n_spo: Sequence[int], scales: Scales, sift: tuple[float, float], semigroup: Semigroup
 ) -> pd.DataFrame:
     r"""What samplings mean for kernels: with SIFT's step in space, and balanced with that in scale.
 
@@ -79,8 +79,8 @@ def sampling_theory(
         Scales per octave.
     scales : Scales
         First scale and ratio of the two blurs.
-    sift : SiftSampling
-        First scale and sampling step of SIFT.
+    sift : (float, float)
+        First scale and sampling step of SIFT, pixels.
     semigroup : Semigroup
         The blob, in samples, and how often it is blurred; see
         `keystab.experiments.semigroup_table.semigroup_table`.
@@ -97,15 +97,15 @@ def sampling_theory(
 
     Examples
     --------
-    >>> sift, blurs = SiftSampling(0.8, 0.5), Semigroup(1.1, 10, 0.1, 1.5, 57, 4.0)
-    >>> table = sampling_theory([3, 15], Scales(1.1, 2 ** (1 / 3)), sift, blurs)
+    >>> blurs = Semigroup(1.1, 10, 0.1, 1.5, 57, 4.0)
+    >>> table = sampling_theory([3, 15], Scales(1.1, 2 ** (1 / 3)), (0.8, 0.5), blurs)
     >>> table[["grid", "n_spo", "increment"]].round(2).to_numpy().tolist()
     [['sift', 3, 1.23], ['sift', 15, 0.5], ['balanced', 3, 1.65], ['balanced', 15, 3.69]]
     """
     rows = []
     for grid in ("sift", "balanced"):
         for n in n_spo:
-            first, delta = sift.sigma_min_of_sift, sift.delta_min_of_sift
+            first, delta = sift
             if grid == "balanced":
                 first = scales.sigma_min
                 delta = balanced_delta(n, scales.kappa, first)

@@ -103,6 +103,8 @@ Audits
     audits_by_phase : tables of errors against the sub-pixel phase
 
 Theory
+    sift_sigma_min : first scale of SIFT as shipped, pixels
+    sift_delta_min : sampling step of SIFT as shipped, pixels
     profiles : table of profiles of point spread functions
     camera_blur : camera blur, pixels
     n_oct : octaves

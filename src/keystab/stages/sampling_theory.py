@@ -2,16 +2,23 @@
 
 from pathlib import Path
 
-from keystab.parameters import Scales, Semigroup, SiftSampling
+from keystab.parameters import Scales, Semigroup
 from keystab.stages._command import command
 
 
 @command
 def main(
-    n_spo: list[int], scales: Scales, sift: SiftSampling, semigroup: Semigroup, *, table: Path
+    n_spo: list[int],
+    scales: Scales,
+    semigroup: Semigroup,
+    sift_sigma_min: float,
+    sift_delta_min: float,
+    *,
+    table: Path,
 ) -> None:
     """Write a table of the blurs that samplings add, and of how much their steps change."""
-    from keystab.experiments import sampling_theory
+    from keystab.experiments.sampling_theory import sampling_theory
     from keystab.io.tables import write_table
 
-    write_table(sampling_theory.sampling_theory(n_spo, scales, sift, semigroup), table)
+    sift = (sift_sigma_min, sift_delta_min)
+    write_table(sampling_theory(n_spo, scales, sift, semigroup), table)
