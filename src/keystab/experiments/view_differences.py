@@ -119,7 +119,8 @@ def difference_table(pairs: Iterable[Pair], n_resamples: int) -> pd.DataFrame:
                 difference = a / np.where(b > 0, b, np.nan) - 1
             else:
                 difference = a - b
-            low, high = centred_interval(difference[1:], difference[0])
+            limits = (-1.0, np.inf) if quantity.startswith("relative_") else (-1.0, 1.0)
+            low, high = centred_interval(difference[1:], difference[0], limits=limits)
             values = {"value": a[0], "other": b[0], "difference": difference[0]}
             ends = {"low": float(low), "high": float(high)}
             names = {"against": pair.against, "quantity": quantity}

@@ -335,15 +335,17 @@ def _judged(claim: Claim, found: Mapping[str, Measured]) -> _Judged:
     by_numbers = REPRODUCED if asked.holds else FAILED
     if not asked.holds and weaker and weaker.holds:
         by_numbers = CONDITION
+    if asked.decided and asked.holds:
+        return _Judged(REPRODUCED, "", by_numbers, level(asked))
+    if weaker and weaker.decided and weaker.holds:
+        # The strongest that is decided: whether it would hold without the condition may stay open.
+        told = "" if asked.decided else " Without it the claim is undecided."
+        needed = (asked, weaker) if asked.decided else (weaker,)
+        return _Judged(CONDITION, words + told, by_numbers, level(*needed))
     if not asked.decided:
         return _Judged(UNDECIDED, f"By the numbers alone: {by_numbers}.", by_numbers, level(asked))
-    if asked.holds:
-        return _Judged(REPRODUCED, "", by_numbers, level(asked))
     if weaker and not weaker.decided:
-        told = f"Whether it holds with its condition is undecided ({claim.condition_words})."
-        return _Judged(FAILED, told, by_numbers, level(asked))
-    if by_numbers == CONDITION and weaker:
-        return _Judged(CONDITION, words, by_numbers, level(asked, weaker))
+        untested = f"Whether it holds with its condition is undecided ({claim.condition_words})."
     return _Judged(FAILED, untested, by_numbers, level(asked))
 
 
