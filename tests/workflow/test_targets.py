@@ -17,7 +17,7 @@ from keystab.study.claims_report import FIELDS
 from keystab.study.plan import FIGURES
 
 PICTURES = sorted((ROOT / "config/pictures").glob("*.yaml"))
-LEDGER = f"{','.join(FIELDS)}\none,,,,,,,,,reproduced,\n"
+LEDGER = f"{','.join(FIELDS)}\none,,,,,,,,,reproduced,,,,,\n"
 
 
 def test_whole_study_at_the_papers_settings(planned):
