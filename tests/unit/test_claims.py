@@ -445,8 +445,16 @@ def test_every_criterion_can_hold_and_can_fail(listed):
 
 
 @pytest.mark.parametrize("listed", [each for each in LISTED if each.criterion], ids=lambda listed: listed.id)  # fmt: skip
-def test_every_number_has_an_interval_or_a_word_why_not(listed):
-    assert bool(listed.uncertainty) is not claims.has_intervals(listed.quantities)
+def test_what_decides_has_an_interval_or_a_word_why_not(listed):
+    parts = {part.name: part for part in listed.quantities}
+
+    def measured_in(names):
+        for name in names:
+            inner = parts[name].expression
+            yield from measured_in(expressions.names_of(inner)) if inner else [parts[name]]
+
+    deciding = list(measured_in(expressions.names_of(listed.criterion)))
+    assert bool(listed.uncertainty) is not claims.has_intervals(deciding)
 
 
 def test_claims_are_many_and_of_the_whole_paper():

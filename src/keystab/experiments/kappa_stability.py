@@ -60,8 +60,8 @@ def scale_slopes(normalised: NDArray[np.float64], kappas: Sequence[float]) -> ND
     --------
     >>> kappas = [1.1, 1.2, 1.3, 1.4]
     >>> blob = [1.5] * 4
-    >>> scale_slopes(np.array([blob, np.sqrt(kappas)]), kappas).round(6).tolist()
-    [-0.5, 0.0]
+    >>> (1 + scale_slopes(np.array([blob, np.sqrt(kappas)]), kappas)).round(6).tolist()
+    [0.5, 1.0]
     """
     seen = np.isfinite(normalised)
     n_seen = seen.sum(axis=1)

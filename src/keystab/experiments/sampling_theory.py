@@ -1,4 +1,4 @@
-r"""What scales mean for Gaussians and noise, without a picture (sections 2.2, 5.1 and 6.3).
+r"""What samplings of a scale-space mean for its Gaussians, without a picture (sections 2.2, 5.1).
 
 Two things are asked of samplings. How much blur is added from one scale to the next, in samples,
 and does a sampled kernel of that width still blur as a Gaussian does? And do its steps in scale and
@@ -16,9 +16,8 @@ import pandas as pd
 from keystab.experiments.semigroup_table import semigroup_table
 from keystab.parameters import Scales, Semigroup
 from keystab.scalespace.sampling import balanced_delta
-from keystab.scalespace.white_noise import dog_noise, gaussian_noise
 
-__all__ = ["kernel_distances", "noise_theory", "sampling_theory"]
+__all__ = ["kernel_distances", "sampling_theory"]
 
 _UNTRUNCATED = 12.0
 """Radius of a kernel that is not cut off, over its standard deviation: e^-72 is left out."""
@@ -136,35 +135,3 @@ def _errors(added: float, blob: float, n_passes: int, truncation: float) -> dict
         "untruncated_error": error("sampled", _UNTRUNCATED),
         "dct_error": error("dct", truncation),
     }
-
-
-def noise_theory(scales: Scales, camera_blur: float, n_oct: int) -> pd.DataFrame:
-    r"""Noise of both scale-spaces against scale, and its ratio from octave to octave (figure 12).
-
-    Parameters
-    ----------
-    scales : Scales
-        First scale and ratio of the two blurs.
-    camera_blur : float
-        Blur c of the camera, which the noise does not have, pixels.
-    n_oct : int
-        Octaves.
-
-    Returns
-    -------
-    DataFrame
-        One row per scale: ``sigma``; ``dog_noise`` of unit white noise in the difference of
-        Gaussians, and its ``octave_ratio``, that at :math:`\sigma` over that at :math:`2\sigma`;
-        ``gaussian_noise`` and ``gaussian_octave_ratio``, the same of the Gaussian scale-space.
-
-    Examples
-    --------
-    >>> table = noise_theory(Scales(1.1, 2 ** (1 / 3)), 0.8, 2)
-    >>> table[["octave_ratio", "gaussian_octave_ratio"]].iloc[[0, -1]].round(2).to_numpy().tolist()
-    [[3.91, 2.64], [2.06, 2.03]]
-    """
-    sigma = scales.sigma_min * 2.0 ** np.linspace(0, n_oct, 20 * n_oct + 1)
-    here, above = (dog_noise(each, camera_blur, scales.kappa) for each in (sigma, 2 * sigma))
-    columns = {"sigma": sigma, "dog_noise": here, "octave_ratio": here / above}
-    here, above = (gaussian_noise(np.sqrt(v**2 - camera_blur**2)) for v in (sigma, 2 * sigma))
-    return pd.DataFrame(columns | {"gaussian_noise": here, "gaussian_octave_ratio": here / above})

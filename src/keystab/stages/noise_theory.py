@@ -9,7 +9,7 @@ from keystab.stages._command import command
 @command
 def main(camera_blur: float, scales: Scales, n_oct: int, *, table: Path) -> None:
     """Write a table of the noise at many scales, and of its ratio from octave to octave."""
-    from keystab.experiments import sampling_theory
+    from keystab.experiments.noise_against_scale import noise_against_scale
     from keystab.io.tables import write_table
 
-    write_table(sampling_theory.noise_theory(scales, camera_blur, n_oct), table)
+    write_table(noise_against_scale(scales, camera_blur, n_oct), table)
