@@ -69,6 +69,19 @@ def test_the_largest_of_several_is_charged_for_the_choice_where_one_would_do():
     assert decide("-a < -0.24", smallest).p == pytest.approx(p)
 
 
+def test_two_choices_are_charged_each_in_its_own_interval():
+    """By hand: at the level found, the wider intervals of both just touch."""
+    pair = {
+        "most": Known(2.0, 1.9, 2.1, extreme="max", chosen_from=9),
+        "least": Known(1.7, 1.65, 1.75, extreme="min", chosen_from=4),
+    }
+    p = decide("most - least > 0.1", pair).p
+    widths = (h * norm.ppf(1 - p / (2 * k)) / Z for h, k in ((0.1, 9), (0.05, 4)))
+    assert math.hypot(*widths) == pytest.approx(0.2)
+    assert p < 36 * p_of(0.2, math.hypot(0.1, 0.05))
+    assert decide("most - least > 0.3", pair).p == 1.0
+
+
 def test_a_difference_of_shares_has_the_interval_of_newcombe():
     """Newcombe 1998, method 10: 56 of 70 against 48 of 80 is 0.2, 0.0524 to 0.3339."""
     shares = {}

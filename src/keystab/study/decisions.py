@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keystab.study.expressions import evaluate, names_of
+from keystab.utils.roots import root_between
 
 __all__ = ["LEVEL", "Decision", "Known", "decide", "holm", "interval_of"]
 
@@ -31,6 +32,9 @@ LEVEL = 0.05
 
 _NORMAL = NormalDist()
 _Z = _NORMAL.inv_cdf(1 - LEVEL / 2)
+
+_LEAST = 1e-100
+"""Levels below are not told apart."""
 
 _SIGNS: dict[type[ast.cmpop], int] = {ast.Lt: 1, ast.LtE: 1, ast.Gt: -1, ast.GtE: -1}
 """Comparisons with a margin: right side minus left side, times this."""
@@ -80,6 +84,15 @@ class Decision(NamedTuple):
         return self.p <= LEVEL
 
 
+class _Change(NamedTuple):
+    """By how much a number at the ends of its interval lowers and raises something."""
+
+    below: float
+    above: float
+    rises: bool
+    """Whether that something rises with the number."""
+
+
 def decide(criterion: str, numbers: Mapping[str, Known]) -> Decision:
     """Say whether a criterion holds, and at which level that is decided.
 
@@ -94,8 +107,9 @@ def decide(criterion: str, numbers: Mapping[str, Known]) -> Decision:
     -------
     Decision
         All of several comparisons hold at the level of the weakest. That one of k fails is decided
-        at k times the level of the strongest (Bonferroni), since any of them could have; likewise
-        for the largest or smallest of k numbers, where any of these would have done.
+        at k times the level of the strongest (Bonferroni), since any of them could have. Likewise
+        the interval of the largest or smallest of k numbers is one of 1 - p / k where any of these
+        would have done.
 
     Raises
     ------
@@ -125,10 +139,13 @@ def interval_of(expression: str, numbers: Mapping[str, Known]) -> tuple[float, f
     [3.0, 4.0]
     """
     names = names_of(expression)
-    if all(math.isnan(numbers[name].low) for name in _measured_in(names, numbers)):
+    changes = _moved(lambda values: evaluate(expression, values), numbers, names).values()
+    if not changes:
         return math.nan, math.nan
-    below, above, _ = _moved(lambda values: evaluate(expression, values), numbers, names)
     middle = float(evaluate(expression, _values(numbers, {})))
+    below, above = (
+        math.hypot(*(getattr(change, side) for change in changes)) for side in ("below", "above")
+    )
     return middle - below, middle + above
 
 
@@ -191,32 +208,46 @@ def _compared(
         return sign * (evaluate(sides[1], values) - evaluate(sides[0], values))
 
     names = names_of(sides[0]) | names_of(sides[1])
-    below, above, ways = _moved(margin, numbers, names)
     middle = abs(float(margin(_values(numbers, {}))))
-    towards_line = below if holds else above
-    if not towards_line:
-        return Decision(holds, 0.0)
-    p = 2 * (1 - _NORMAL.cdf(_Z * middle / towards_line)) if math.isfinite(middle) else 0.0
-    times = 1
-    for name, rises in ways.items():
+    towards_line, families = [], []
+    for name, change in _moved(margin, numbers, names).items():
+        towards_line.append(change.below if holds else change.above)
         # The largest of k numbers: that it lies above the line could be so of any of them.
-        above_the_line = rises == holds
-        if (numbers[name].extreme == "max") == above_the_line and numbers[name].extreme:
-            times *= numbers[name].chosen_from
-    return Decision(holds, min(1.0, times * p))
+        extreme = numbers[name].extreme
+        one_would_do = extreme and (extreme == "max") == (change.rises == holds)
+        families.append(numbers[name].chosen_from if one_would_do else 1)
+    return Decision(holds, _level(middle, towards_line, families))
+
+
+def _level(margin: float, changes: Sequence[float], families: Sequence[int]) -> float:
+    """Level at which the interval of a margin touches zero.
+
+    `changes` are those by numbers at the ends of their intervals of 1 - LEVEL, `families` from how
+    many each was chosen.
+    """
+    if not any(changes) or not math.isfinite(margin):
+        return 0.0
+    if max(families) == 1:
+        return 2 * _NORMAL.cdf(-_Z * margin / math.hypot(*changes))
+
+    def too_wide(logarithm: float) -> float:
+        """How much wider the interval of this level is than the margin."""
+        level = math.exp(logarithm)
+        widths = (
+            change * _NORMAL.inv_cdf(level / (2 * family)) / _Z
+            for change, family in zip(changes, families, strict=True)
+        )
+        return math.hypot(*widths) - margin
+
+    return math.exp(root_between(too_wide, math.log(_LEAST), 0.0))
 
 
 def _moved(
     function: Callable[[Mapping[str, Any]], Any], numbers: Mapping[str, Known], names: set[str]
-) -> tuple[float, float, dict[str, bool]]:
-    """Move measured numbers to the ends of their intervals, one at a time.
-
-    Returns by how much the function may lie lower and higher, and of each number that moves it
-    whether it rises with it.
-    """
+) -> dict[str, _Change]:
+    """Move measured numbers to the ends of their intervals, one at a time."""
     middle = float(function(_values(numbers, {})))
-    below = above = 0.0
-    ways: dict[str, bool] = {}
+    changes: dict[str, _Change] = {}
     for name in sorted(_measured_in(names, numbers)):
         known = numbers[name]
         if math.isnan(known.low) or math.isnan(known.high):
@@ -225,11 +256,10 @@ def _moved(
             float(function(_values(numbers, {name: end}))) - middle
             for end in (known.low, known.high)
         )
-        below += min(at_low, at_high, 0.0) ** 2
-        above += max(at_low, at_high, 0.0) ** 2
-        if at_low != at_high:
-            ways[name] = at_high > at_low
-    return math.sqrt(below), math.sqrt(above), ways
+        changes[name] = _Change(
+            -min(at_low, at_high, 0.0), max(at_low, at_high, 0.0), at_high > at_low
+        )
+    return changes
 
 
 def _measured_in(names: set[str], numbers: Mapping[str, Known]) -> set[str]:
