@@ -138,6 +138,15 @@ def test_choices_are_paired_with_what_they_are_compared_with():
     assert {pair.other.labels["max_offset"] for pair in twos} == {1.0}
 
 
+def test_parts_of_a_set_are_compared_each_by_itself():
+    kinds = [labels(), labels("discrete")]
+    choices = [Choice({"tilt": tilt, **kind}, views_of(SEEN[:, :n])) for tilt, n in ((5, 8), (40, 6)) for kind in kinds]  # fmt: skip
+    pairs = pairs_of_choices(choices, (0.6, 2))
+    assert all(pair.one.labels["tilt"] == pair.other.labels["tilt"] for pair in pairs)
+    table = difference_table(pairs, 20)
+    assert (table["difference"] == 0).all() and table["tilt"].tolist().count(40) == 10
+
+
 def differences(one: np.ndarray, other: np.ndarray, n_resamples: int = 200) -> pd.DataFrame:
     choices = [Choice(labels(), views_of(other)), Choice(labels("discrete"), views_of(one))]
     table = difference_table(pairs_of_choices(choices, (0.6, 2)), n_resamples)

@@ -8,6 +8,7 @@ and the same views, and the difference gets the interval.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +40,9 @@ that see a keypoint, the share seen in less than `UNSTABLE` of them; and by what
 and the number seen in all, is larger than the other's."""
 
 
+_CHOICE = ("n_spo", "detections", "max_offset", "max_iterations")
+
+
 class Choice(NamedTuple):
     """Keypoints of a set of views and the columns that name them."""
 
@@ -60,7 +64,8 @@ def pairs_of_choices(choices: Sequence[Choice], usual: tuple[float, float]) -> l
     Parameters
     ----------
     choices : sequence of Choice
-        With the labels ``n_spo, detections, max_offset, max_iterations``.
+        With the labels ``n_spo, detections, max_offset, max_iterations``; others name parts of a
+        set of views, which are compared each by itself.
     usual : (float, float)
         M_offset and N_interp of the usual refinement.
 
@@ -75,11 +80,11 @@ def pairs_of_choices(choices: Sequence[Choice], usual: tuple[float, float]) -> l
     finest = max((choice.labels["n_spo"] for choice in choices), default=0)
     pairs = []
     for name, one in named.items():
-        n_spo, detections, max_offset, max_iterations = name
-        others = {f"usual at {finest}": (finest, "refined", *usual)}
-        others["usual"] = (n_spo, "refined", *usual)
+        (n_spo, detections, max_offset, max_iterations), part = name[:4], name[4:]
+        others = {f"usual at {finest}": (finest, "refined", *usual, *part)}
+        others["usual"] = (n_spo, "refined", *usual, *part)
         if detections == "refined" and max_iterations != 2:
-            others["two"] = (n_spo, "refined", max_offset, 2)
+            others["two"] = (n_spo, "refined", max_offset, 2, *part)
         pairs += [
             Pair(one, named[other], against)
             for against, other in others.items()
@@ -133,14 +138,11 @@ def _resampled(choices: Sequence[Choice], n_resamples: int) -> list[dict[str, ND
     places = [_places(choice.matched) for choice in choices]
     pieces = piece_numbers(places)
     n_pieces = 1 + max((int(each.max()) for each in pieces if len(each)), default=-1)
-    n_views = choices[0].matched.found.shape[1] if choices else 0
-    drawn = (
-        np.vstack([np.ones((1, n), np.int64), bootstrap_counts(n, n_resamples, "pairs", what)])
-        for n, what in ((n_pieces, "pieces"), (n_views, "views"))
-    )
-    of_pieces, of_views = drawn
+    of_pieces = _draws(n_pieces, n_resamples, "pieces")
     results = []
     for choice, own in zip(choices, pieces, strict=True):
+        n_views = choice.matched.found.shape[1]
+        of_views = _draws(n_views, n_resamples, "views")
         weight = of_pieces[:, own].astype(float)
         number = of_views @ choice.matched.seen.T.astype(np.int64)
         always, rare = number == n_views, number < UNSTABLE * n_views
@@ -158,6 +160,13 @@ def _resampled(choices: Sequence[Choice], n_resamples: int) -> list[dict[str, ND
     return results
 
 
+@cache
+def _draws(n: int, n_resamples: int, what: str) -> NDArray[np.int64]:
+    """How often each of n counts: once in the data, which come first, else as it is drawn."""
+    drawn = bootstrap_counts(n, n_resamples, "differences", what)
+    return np.vstack([np.ones((1, n), np.int64), drawn])
+
+
 def _places(matched: MatchedViews) -> pd.DataFrame:
     """Where the unique keypoints lie: the mean of their detections."""
     axes = {axis: gather(matched.common[axis], matched.found) for axis in ("y", "x")}
@@ -166,6 +175,7 @@ def _places(matched: MatchedViews) -> pd.DataFrame:
 
 
 def _name(labels: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Labels as a key; discrete extrema have no limits."""
+    """Labels as a key: those of a choice, and any others; discrete extrema have no limits."""
     limits = (labels["max_offset"], labels["max_iterations"])
-    return labels["n_spo"], labels["detections"], *(None if x != x else x for x in limits)
+    parts = [value for name, value in labels.items() if name not in _CHOICE]
+    return labels["n_spo"], labels["detections"], *(None if x != x else x for x in limits), *parts
