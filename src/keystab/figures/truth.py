@@ -164,9 +164,11 @@ def _draw_errors(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> N
     drawn = [spline[f"{quantile}_{name}"] for quantile, _ in lines]
     values = np.concatenate([*drawn, cosine[f"median_{name}"]])
     values = values[values > 0]
-    style.log_y_axis(ax, 0.6 * values.min(), 2.5 * values.max())
+    room = 5.0 if name == "location" else 2.5  # for what the lines mean
+    style.log_y_axis(ax, 0.6 * values.min(), room * values.max())
     if name == "location":
-        _list(ax, [("solid: median, dotted: 90 %, dash-dotted: r.m.s.", palette.GREY)], top=True)
+        words = ("solid: median, dotted: 90 %", "dash-dotted: r.m.s.")
+        _list(ax, [(each, palette.GREY) for each in words], top=True)
     style.sampling_axis(ax, spline["n_spo"])
     style.finish_axes(ax)
 
