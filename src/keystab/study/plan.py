@@ -100,7 +100,7 @@ FIGURES = {
 }
 """The figures in their order: what each shows, and the tables and sets that it is made from."""
 
-TABLES_NOT_DRAWN = ("fig8_translations.csv", "figS1_differences.csv", "refinement.csv")
+TABLES_NOT_DRAWN = ("fig8_translations.csv", "refinement.csv")
 """Tables of a scene that no figure draws and no claim needs."""
 
 TABLES_OF_SCENES = ("predictors_detections.parquet",)
