@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from keystab.camera.views import ViewSpec
 from keystab.evaluation.localization import mean_localization
 from keystab.evaluation.roc import area_under_curve, areas_above
 from keystab.evaluation.scene_pieces import SIDE, count_ratios, piece_numbers, ratio_intervals
@@ -28,7 +29,8 @@ from keystab.experiments.view_differences import (
     difference_table,
     pairs_of_choices,
 )
-from keystab.experiments.view_stability import MatchedViews
+from keystab.experiments.view_stability import MatchedViews, scale_table
+from keystab.matching.common_range import CommonRange
 from keystab.parameters import Scales, Semigroup
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
@@ -179,6 +181,18 @@ def test_a_difference_is_surer_than_the_shares_that_it_is_of():
     width = table.loc["mean_stability", "high"] - table.loc["mean_stability", "low"]
     error = 1.96 * SEEN.mean(axis=1).std() / math.sqrt(len(SEEN))
     assert width < 2 * error
+
+
+def test_steps_are_those_of_the_percentages_and_paired():
+    """Octaves that hold the same keypoints differ by nothing, however they are drawn."""
+    views = [ViewSpec(1.1, 1.0, (2500, 40)) for _ in range(8)]
+    table = views_of(SEEN).common.assign(sigma=np.where(np.arange(SEEN.sum()) < 200, 2.0, 3.5))
+    everywhere = CommonRange(views, (2500, 40), 0.0, 0.0)
+    found = scale_table(table.assign(x=20.0), everywhere, [1.8, 1.9, 2.2], SAME, 0.7, {}, 60)
+    assert found["step"].isna().tolist() == [True, False, False]
+    assert found["step"][2] == pytest.approx(np.diff(found["percentage_seen"])[1])
+    assert (found.loc[1, ["step", "low_step", "high_step"]] == 0).all()
+    assert found["low_step"][2] < found["step"][2] < found["high_step"][2]
 
 
 def test_areas_above_are_differences_of_areas_on_the_same_keypoints():

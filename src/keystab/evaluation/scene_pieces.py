@@ -8,14 +8,17 @@ drawn with the same pieces, so that differences and ratios are paired.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.evaluation.intervals import bootstrap_counts, percentile_interval
+from keystab.matching.unique_keypoints import gather
 
-__all__ = ["SIDE", "count_ratios", "piece_numbers", "ratio_intervals"]
+__all__ = ["SIDE", "Drawn", "count_ratios", "drawn_anew", "piece_numbers", "ratio_intervals"]
 
 SIDE = 32.0
 """Side of a piece in pixels."""
@@ -92,3 +95,73 @@ def ratio_intervals(
     ratios, samples = count_ratios(tables, reference, purpose=(purpose,))
     low, high = percentile_interval(samples)
     return pd.DataFrame({name: ratios, f"low_{ends}": low, f"high_{ends}": high})
+
+
+class Drawn(NamedTuple):
+    """Unique keypoints in the data, in the first row, and in resamples of pieces and of views.
+
+    Attributes
+    ----------
+    weight : ndarray of float, shape (n_resamples + 1, n_keypoints)
+        How often each counts: as often as the piece in which it lies was drawn.
+    number : ndarray of int, of the same shape
+        In how many of the views that were drawn it is seen.
+    n_views : int
+        How many views were drawn: as many as there are.
+    """
+
+    weight: NDArray[np.float64]
+    number: NDArray[np.int64]
+    n_views: int
+
+    def share(self, needed: int) -> NDArray[np.float64]:
+        """Share of the keypoints seen at all that are seen in at least `needed` views."""
+        total = (self.weight * (self.number > 0)).sum(axis=1)
+        some = (self.weight * (self.number >= max(needed, 1))).sum(axis=1)
+        shares: NDArray[np.float64] = some / np.where(total > 0, total, np.nan)
+        return shares
+
+
+def drawn_anew(
+    matched: Sequence[tuple[pd.DataFrame, NDArray[np.intp]]], n_resamples: int
+) -> list[Drawn]:
+    """Draw the unique keypoints of several choices anew, with the same pieces and views for all.
+
+    Parameters
+    ----------
+    matched : sequence of (DataFrame, ndarray of int, shape (n_keypoints, n_views))
+        Detections with ``y, x`` in pixels of one frame, and for each unique keypoint its row there
+        in every view, or -1.
+    n_resamples : int
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"y": [1.0, 1.0, 90.0], "x": [1.0, 1.0, 3.0]})
+    >>> (drawn,) = drawn_anew([(table, np.array([[0, 1], [2, -1]]))], n_resamples=5)
+    >>> drawn.number[0].tolist(), float(drawn.share(2)[0])
+    ([2, 1], 0.5)
+    """
+    places = []
+    for table, found in matched:
+        seen = np.maximum((found >= 0).sum(axis=1), 1)
+        places.append(
+            pd.DataFrame(
+                {axis: np.nansum(gather(table[axis], found), axis=1) / seen for axis in ("y", "x")}
+            )
+        )
+    pieces = piece_numbers(places)
+    n_pieces = 1 + max((int(each.max()) for each in pieces if len(each)), default=-1)
+    of_pieces = _draws(n_pieces, n_resamples, "pieces")
+    drawn = []
+    for (_, found), own in zip(matched, pieces, strict=True):
+        of_views = _draws(found.shape[1], n_resamples, "views")
+        number = of_views @ (found >= 0).T.astype(np.int64)
+        drawn.append(Drawn(of_pieces[:, own].astype(float), number, found.shape[1]))
+    return drawn
+
+
+@cache
+def _draws(n: int, n_resamples: int, what: str) -> NDArray[np.int64]:
+    """How often each of n counts: once in the data, which come first, else as it is drawn."""
+    drawn = bootstrap_counts(n, n_resamples, "differences", what)
+    return np.vstack([np.ones((1, n), np.int64), drawn])

@@ -8,18 +8,16 @@ and the same views, and the difference gets the interval.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.evaluation.intervals import bootstrap_counts, centred_interval
-from keystab.evaluation.scene_pieces import piece_numbers
+from keystab.evaluation.intervals import centred_interval
+from keystab.evaluation.scene_pieces import drawn_anew
 from keystab.evaluation.stability import UNSTABLE
 from keystab.experiments.view_stability import MatchedViews
-from keystab.matching.unique_keypoints import gather
 
 __all__ = [
     "QUANTITIES",
@@ -140,43 +138,22 @@ def difference_table(pairs: Iterable[Pair], n_resamples: int) -> pd.DataFrame:
 
 def _resampled(choices: Sequence[Choice], n_resamples: int) -> list[dict[str, NDArray[np.float64]]]:
     """Quantities of choices in the data (first) and in each resample, drawn with the same draws."""
-    places = [_places(choice.matched) for choice in choices]
-    pieces = piece_numbers(places)
-    n_pieces = 1 + max((int(each.max()) for each in pieces if len(each)), default=-1)
-    of_pieces = _draws(n_pieces, n_resamples, "pieces")
+    matched = [(choice.matched.common, choice.matched.found) for choice in choices]
     results = []
-    for choice, own in zip(choices, pieces, strict=True):
-        n_views = choice.matched.found.shape[1]
-        of_views = _draws(n_views, n_resamples, "views")
-        weight = of_pieces[:, own].astype(float)
-        number = of_views @ choice.matched.seen.T.astype(np.int64)
-        always, rare = number == n_views, number < UNSTABLE * n_views
+    for weight, number, n_views in drawn_anew(matched, n_resamples):
         total = (weight * (number > 0)).sum(axis=1)
         total = np.where(total > 0, total, np.nan)
-        n_always = (weight * always).sum(axis=1)
+        rare = (number > 0) & (number < UNSTABLE * n_views)
+        n_always = (weight * (number == n_views)).sum(axis=1)
         results.append(
             {
                 "n_always": n_always,
                 "share_always": n_always / total,
                 "mean_stability": (weight * number).sum(axis=1) / n_views / total,
-                "share_unstable": (weight * (rare & (number > 0))).sum(axis=1) / total,
+                "share_unstable": (weight * rare).sum(axis=1) / total,
             }
         )
     return results
-
-
-@cache
-def _draws(n: int, n_resamples: int, what: str) -> NDArray[np.int64]:
-    """How often each of n counts: once in the data, which come first, else as it is drawn."""
-    drawn = bootstrap_counts(n, n_resamples, "differences", what)
-    return np.vstack([np.ones((1, n), np.int64), drawn])
-
-
-def _places(matched: MatchedViews) -> pd.DataFrame:
-    """Where the unique keypoints lie: the mean of their detections."""
-    axes = {axis: gather(matched.common[axis], matched.found) for axis in ("y", "x")}
-    seen = np.maximum(matched.seen.sum(axis=1), 1)
-    return pd.DataFrame({axis: np.nansum(values, axis=1) / seen for axis, values in axes.items()})
 
 
 def _name(labels: Mapping[str, Any]) -> tuple[Any, ...]:
