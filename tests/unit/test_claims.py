@@ -363,7 +363,7 @@ def test_errors_name_the_claim():
         ({"value": {"fine": 3}}, "value fine: give an expression"),
         ({"value": {"max": "1"}}, "'max' cannot be the name"),
         ({"value": {"fine": "later", "later": "1"}}, "value fine uses later"),
-        ({"uncertainty": "exact: a closed form"}, "its numbers have intervals"),
+        ({"uncertainty": "exact: a closed form"}, "what decides has intervals"),
         ({"value": {"fine": "1"}, "criterion": "fine > 0", "uncertainty": "none"}, "'exact: ' or"),
     ],
 )
@@ -446,15 +446,7 @@ def test_every_criterion_can_hold_and_can_fail(listed):
 
 @pytest.mark.parametrize("listed", [each for each in LISTED if each.criterion], ids=lambda listed: listed.id)  # fmt: skip
 def test_what_decides_has_an_interval_or_a_word_why_not(listed):
-    parts = {part.name: part for part in listed.quantities}
-
-    def measured_in(names):
-        for name in names:
-            inner = parts[name].expression
-            yield from measured_in(expressions.names_of(inner)) if inner else [parts[name]]
-
-    deciding = list(measured_in(expressions.names_of(listed.criterion)))
-    assert bool(listed.uncertainty) is not claims.has_intervals(deciding)
+    assert bool(listed.uncertainty) is not claims.has_intervals(claims.deciding(listed))
 
 
 def test_claims_are_many_and_of_the_whole_paper():

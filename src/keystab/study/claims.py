@@ -16,7 +16,15 @@ from keystab.errors import InputError
 from keystab.study.expressions import CALLS, CONSTANTS, names_of
 from keystab.study.plain_yaml import read_plain_yaml
 
-__all__ = ["Claim", "Quantity", "has_intervals", "parse_claims", "read_claims", "table_names"]
+__all__ = [
+    "Claim",
+    "Quantity",
+    "deciding",
+    "has_intervals",
+    "parse_claims",
+    "read_claims",
+    "table_names",
+]
 
 
 class Quantity(NamedTuple):
@@ -57,8 +65,8 @@ class Claim(NamedTuple):
     """A statement of the paper and how it is tested.
 
     `criterion` is empty for what cannot be tested; `note` then says why. `condition` is a weaker
-    criterion, and `condition_words` says what it asks. `uncertainty` says why no number has an
-    interval, where none has: "exact" or "descriptive", and a reason.
+    criterion, and `condition_words` says what it asks. `uncertainty` says why no number that
+    decides has an interval, where none has: "exact" or "descriptive", and a reason.
     """
 
     id: str
@@ -160,8 +168,9 @@ def _claim(entry: Any) -> Claim:
         quantities=quantities,
         criterion=_over(names, _text(entry, "criterion"), "criterion"),
         note=_text(entry, "note", needed=False),
-        uncertainty=_uncertainty(entry, quantities),
+        uncertainty=_text(entry, "uncertainty", needed=False),
     )
+    _check_uncertainty(claim)
     if "condition" not in entry:
         return claim
     condition = entry["condition"]
@@ -174,14 +183,33 @@ def _claim(entry: Any) -> Claim:
     )
 
 
-def _uncertainty(entry: Mapping[str, Any], quantities: Sequence[Quantity]) -> str:
-    """Return why no number has an interval, where none has."""
-    words = _text(entry, "uncertainty", needed=False)
-    if words and has_intervals(quantities):
-        raise InputError("uncertainty: its numbers have intervals; leave it out")
-    if words and not re.match(r"(exact|descriptive): \S", words):
+def _check_uncertainty(claim: Claim) -> None:
+    """Refuse words about why nothing has an interval that are not needed, or say nothing."""
+    if claim.uncertainty and has_intervals(deciding(claim)):
+        raise InputError("uncertainty: what decides has intervals; leave it out")
+    if claim.uncertainty and not re.match(r"(exact|descriptive): \S", claim.uncertainty):
         raise InputError("uncertainty: write 'exact: ' or 'descriptive: ' and why, nothing else")
-    return words
+
+
+def deciding(claim: Claim) -> list[Quantity]:
+    """Numbers taken from tables that the criterion of a claim goes back to.
+
+    Examples
+    --------
+    >>> parts = (Quantity("a", take="one"), Quantity("b", take="one"), Quantity("c", "2 * a"))
+    >>> [part.name for part in deciding(Claim("", "", "", "", "", parts, "c > 1"))]
+    ['a']
+    """
+    parts = {part.name: part for part in claim.quantities}
+    found: dict[str, Quantity] = {}
+    wanted = sorted(names_of(claim.criterion)) if claim.criterion else []
+    while wanted:
+        part = parts[wanted.pop(0)]
+        if part.expression:
+            wanted += sorted(names_of(part.expression))
+        else:
+            found[part.name] = part
+    return list(found.values())
 
 
 def has_intervals(quantities: Iterable[Quantity]) -> bool:

@@ -60,9 +60,8 @@ def records(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
 
 
 def _uncertainty(each: Outcome) -> str:
-    """What is known of how far the numbers could be off."""
-    sampled = any(not math.isnan(part.low) for part in each.measured.values())
-    return "interval" if sampled else each.claim.uncertainty
+    """What is known of how far the numbers that decide could be off."""
+    return each.claim.uncertainty if math.isnan(each.p) else "interval"
 
 
 def _plain(value: float) -> float | str | None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from keystab.errors import InputError
 from keystab.evaluation.intervals import normal_half_width, wilson_interval
 from keystab.evaluation.location_errors import quantile
-from keystab.study.claims import Claim, Quantity
+from keystab.study.claims import Claim, Quantity, deciding
 from keystab.study.decisions import Decision, Known, decide, holm, interval_of
 from keystab.study.expressions import evaluate, names_of
 
@@ -319,7 +319,7 @@ def _judged(claim: Claim, found: Mapping[str, Measured]) -> _Judged:
         return _missing(names, found) or ("no number: " + ", ".join(bad) if bad else "")
 
     def level(*decisions: Decision) -> float:
-        sampled = any(not math.isnan(part.low) for part in found.values())
+        sampled = any(not math.isnan(found[part.name].low) for part in deciding(claim))
         return max(each.p for each in decisions) if sampled else math.nan
 
     missing = no_numbers(claim.criterion)
