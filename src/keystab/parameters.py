@@ -48,6 +48,13 @@ class Camera:
     shift_x: Annotated[list[float], Setting("sets.{set}.shift_x", "shift right, pixels")]
     rotation: Annotated[list[float], Setting("sets.{set}.rotation", "rotation, radians")]
     noise: Annotated[list[float], Setting("sets.{set}.noise", "standard deviation of the noise")]
+    tilt: Annotated[list[float], Setting("sets.{set}.tilt", "tilt of the scene's plane, degrees")]
+    azimuth: Annotated[
+        list[float], Setting("sets.{set}.azimuth", "direction in which it recedes, degrees")
+    ]
+    focal_length: Annotated[
+        float, Setting("sets.{set}.focal_length", "focal length of tilted views, pixels")
+    ]
     height: Annotated[
         int | None, Setting("sets.{set}.height", "height, pixels; None for the whole reference")
     ]
@@ -177,6 +184,16 @@ class Acceptance:
 
 
 @dataclass(frozen=True)
+class Refining(Acceptance):
+    """How extrema are refined, and which are accepted (equation 2, section 5.5)."""
+
+    scale_moves: Annotated[
+        bool, Setting("refinement.scale_moves", "whether a step may change the scale")
+    ]
+    move: Annotated[Literal["nearest", "unit_step"], Setting("refinement.move", "how a step goes")]
+
+
+@dataclass(frozen=True)
 class SiftFilters:
     """SIFT's own choices: which refined keypoints are accepted, and its filters (figure 7)."""
 
@@ -289,6 +306,23 @@ class Folds:
     n_folds: Annotated[int, Setting("predictors.n_folds", "folds of the squares of a picture")]
 
 
+@dataclass(frozen=True)
+class Stated:
+    """What is asked of the camera and of single views because the text says it."""
+
+    camera_blurs: Annotated[
+        list[float], Setting("stated.camera_blurs", "camera blurs whose aliasing is measured")
+    ]
+    assumed_blurs: Annotated[
+        list[float], Setting("stated.assumed_blurs", "blurs that are assumed instead, pixels")
+    ]
+    zooms: Annotated[list[float], Setting("stated.zooms", "zooms whose true extrema are compared")]
+    kappas: Annotated[list[float], Setting("stated.kappas", "ratios of the two blurs, for these")]
+    noise_factors: Annotated[
+        list[float], Setting("stated.noise_factors", "noise added to the reference, over its own")
+    ]
+
+
 # ---------------------------------------------------------------------------------------------
 # Audits
 
@@ -337,6 +371,9 @@ class Optics:
     defocus: Annotated[float, Setting("optics.defocus", "distance from the focus, um")]
     spherical: Annotated[
         float, Setting("optics.spherical", "spherical aberration at f/2, wavelengths")
+    ]
+    confusions: Annotated[
+        list[float], Setting("optics.confusions", "circles of confusion that count as sharp, um")
     ]
     profile_f_number: Annotated[float, Setting("optics.profile_f_number", "f-number of profiles")]
     profile_pitch: Annotated[float, Setting("optics.profile_pitch", "pixel pitch of profiles, um")]

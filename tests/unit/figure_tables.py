@@ -22,7 +22,7 @@ def tables(n: int | str) -> dict[str, pd.DataFrame]:
     """Return the tables of figure `n`; do not change them."""
     makers = {1: fig1, 2: fig2, 3: fig3, 4: fig4, 5: fig5, 7: fig7, 8: fig8, 9: fig9}
     makers |= {10: fig10, 11: fig11, 12: fig12, "S1": figs1, "S2": figs2}
-    makers |= {"S3": figs3, "S4": figs4}
+    makers |= {"S3": figs3, "S4": figs4, "S5": figs5}
     return fig6(per_group=2, half=5) if n == 6 else makers[n]()
 
 
@@ -513,7 +513,54 @@ def figs2() -> dict[str, pd.DataFrame]:
             row["blob_shift"] = 0.5 * np.log2(1 + change / KAPPA / sigma**2)
             row["dilation_shift"] = 0.5 * np.log2(1 - change / sigma**2)
             rows.append(row)
-    return {"figS2": pd.DataFrame(rows)}
+    return {"figS2": pd.DataFrame(rows), "blur_zooms_pairs": _zoomed_pairs()}
+
+
+def _zoomed_pairs() -> pd.DataFrame:
+    """Invent what right and wrong blurs do to keypoints at other zooms."""
+    from keystab.evaluation.intervals import wilson_interval
+
+    rows = []
+    for assumed in (0.4, 0.8, 1.1):
+        for zoom in (1.0, 1.5, 2.0, 3.0):
+            error = assumed - 0.8
+            share = 1 - 0.2 * abs(error) * (zoom - 1) - 0.01 * (zoom > 1)
+            low, high = wilson_interval(round(share * 250), 250)
+            shift = -0.02 * error * (zoom**2 - 1)
+            rows.append(
+                {
+                    "assumed_blur": assumed,
+                    "blur": 0.8,
+                    "zoom": zoom,
+                    "share_found": share,
+                    "low_found": low,
+                    "high_found": high,
+                    "scale_shift": shift,
+                    "q25_shift": shift - 0.01,
+                    "q75_shift": shift + 0.01,
+                }
+            )
+    return pd.DataFrame(rows).sort_values("zoom", ascending=False)
+
+
+def figs5() -> dict[str, pd.DataFrame]:  # noqa: N802
+    """Invent keypoints that a tilt makes less stable, at two samplings."""
+    from keystab.evaluation.intervals import wilson_interval
+
+    counts, precision = [], []
+    for tilt in (5.0, 20.0, 40.0):
+        for n_spo in (3, 15):
+            for detections in ("discrete", "refined"):
+                share = 1 - tilt / 80 - 0.5 / n_spo
+                low, high = wilson_interval(round(share * 300), 300)
+                about = {"tilt": tilt, "n_spo": n_spo, "detections": detections}
+                row = {"n_unique": 300, "n_always": round(share * 300), "share_always": share}
+                counts.append(about | row | {"low_always": low, "high_always": high})
+                for quantity, unit in (("location", 1.0), ("log2_sigma", 0.2)):
+                    mean = unit * (0.3 if detections == "discrete" else 0.1) / n_spo + tilt / 900
+                    row = {"quantity": quantity, "mean": mean, "low": 0.8 * mean}
+                    precision.append(about | row | {"high": 1.2 * mean})
+    return {"figS5_counts": pd.DataFrame(counts), "figS5_precision": pd.DataFrame(precision)}
 
 
 def figs3() -> dict[str, pd.DataFrame]:  # noqa: N802

@@ -16,7 +16,7 @@ from keystab.figures._render import check_tables, main, read_tables, save
 from keystab.io.figure_metadata import PNG_KEY, FigureMetadata, digests_of
 from keystab.io.tables import write_table
 
-NUMBERS = (*range(1, 13), "S1", "S2", "S3", "S4")
+NUMBERS = (*range(1, 13), "S1", "S2", "S3", "S4", "S5")
 
 
 @pytest.fixture(scope="module")
@@ -114,9 +114,10 @@ def test_text_has_seven_points_or_more_and_nothing_touches_the_edge(n, drawn):
         (11, "ab"),
         (12, "abcdef"),
         ("S1", "abc"),
-        ("S2", "ab"),
+        ("S2", "abcd"),
         ("S3", "abcdef"),
         ("S4", "abc"),
+        ("S5", "abc"),
     ],
 )
 def test_panels_carry_their_letters(n, letters, drawn):

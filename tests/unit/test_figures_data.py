@@ -25,6 +25,7 @@ from keystab.figures import (
     figs2,
     figs3,
     figs4,
+    figs5,
     palette,
     style,
 )
@@ -641,6 +642,42 @@ def test_figure_s2_draws_shares_and_shifts_in_the_order_of_the_error():
         assert len(shares.collections) == 2 and len(shifts.collections) == 1
     names = {text.get_text(): text.get_color() for text in panel(figure, "b").texts}
     assert names == {text: look["color"] for text, look in figs2.SHIFTS.values()}
+
+
+def test_figure_s2_draws_wrong_blurs_against_the_zoom():
+    tables, figure = drawn("S2")
+    table = tables["blur_zooms_pairs"].sort_values("zoom")  # the table is in another order
+    for assumed in (0.4, 0.8, 1.1):
+        rows = table[table["assumed_blur"] == assumed]
+        zoom, share = line(panel(figure, "c"), f"{assumed:g}")
+        assert_array_equal(zoom, rows["zoom"])
+        assert_array_equal(share, 100 * rows["share_found"])
+        shift = line(panel(figure, "d"), f"{assumed:g}")
+        assert_array_equal(shift, rows[["zoom", "scale_shift"]].T)
+    (right,) = [text for text in panel(figure, "c").texts if "right" in text.get_text()]
+    assert right.get_text().startswith("assumed 0.8 px")
+    assert right.get_color() == palette.ASSUMED_COLOURS["right"]
+    assert len(panel(figure, "c").collections) == len(panel(figure, "d").collections) == 3
+
+
+def test_figure_s5_draws_every_tilt_at_both_samplings():
+    tables, figure = drawn("S5")
+    for n_spo in (3, 15):
+        for detections in ("discrete", "refined"):
+            name = f"{n_spo}, {detections}"
+            asked = "n_spo == @n_spo and detections == @detections"
+            rows = tables["figS5_counts"].query(asked)
+            tilt, share = line(panel(figure, "a"), name)
+            assert_array_equal(tilt, [5, 20, 40])
+            assert_array_equal(share, 100 * rows["share_always"])
+            for letter, kind in (("b", "location"), ("c", "log2_sigma")):
+                rows = tables["figS5_precision"].query(asked)
+                rows = rows[rows["quantity"] == kind]
+                assert_array_equal(line(panel(figure, letter), name)[1], rows["mean"])
+    with pytest.raises(InputError, match="no location above 0"):
+        figs5.draw(
+            tables | {"figS5_precision": tables["figS5_precision"].assign(mean=0, low=0, high=0)}
+        )
 
 
 @pytest.mark.parametrize("seed", range(5))

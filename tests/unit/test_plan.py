@@ -101,6 +101,27 @@ def test_figure_7_alone_draws_further_limits():
     assert plan.further_limits(full, "fig8", "max_offsets") == []
 
 
+def test_sets_that_answer_statements_are_compared_over_all_their_octaves():
+    full = study("{comparison: {last_scale: 2.0}}")
+    assert plan.last_scale(full, "translations") == plan.last_scale(full, "unbalanced") == 2.0
+    assert plan.last_scale_of_figure(full, "figS5") is None
+    assert plan.last_scale(full, "blur_zooms_0p4") is None
+    octaves = plan.octaves_of_sweep(full, "large_scales")
+    assert octaves[0] == 2.2 and octaves[-1] == pytest.approx(17.6)
+    pairs = [(one.value, one.n_spo) for one in plan.searches_of_sweep(full, "unbalanced")]
+    assert pairs == [(0.073, 3), (0.073, 19), (0.5, 3), (0.5, 19)]
+    assert {plan.stated_key(full, name) for name in plan.STATED_SWEEPS} == {
+        "assumed_blur", "delta_min", "noise",
+    }  # fmt: skip
+
+
+def test_views_of_each_tilt_have_curves_at_all_their_samplings():
+    full = study("{stability: {curve_n_spo: [5, 9]}}")
+    assert plan.curve_n_spo(full, "figS5") == [3, 15] and plan.tilts(full, "figS5")[-1] == 40
+    assert plan.curve_n_spo(full, "fig7") == [5, 9] and plan.tilts(full, "fig7") == []
+    assert plan.finest_curve(full) == 9
+
+
 # Detection
 
 

@@ -54,6 +54,9 @@ def view_arguments(reference: Path, folder: Path, **changes: str) -> list[str]:
         "shift-y": "0.0",
         "shift-x": "0.0",
         "rotation": "0.0",
+        "tilt": "0.0",
+        "azimuth": "0.0",
+        "focal-length": "800",
         "noise": "0.0",
         "height": "None",
         "width": "None",
@@ -226,6 +229,7 @@ def refined_arguments(folder: Path, given: list[str], last_scale: str) -> list[s
         *(*given, "--traces", *(name.replace(".parquet", "_traces.parquet") for name in given if name.endswith(".parquet"))),
         *(*COMPARED, "--last-scale", last_scale, "--max-offset", "0.6", "--max-iterations", "2"),
         *("--table", str(folder / f"refinement_{last_scale}.csv")),
+        *("--dead", str(folder / "dead_range.csv")),
     ]  # fmt: skip
 
 

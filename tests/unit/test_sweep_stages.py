@@ -32,6 +32,7 @@ def sets(tmp_path_factory) -> list[Path]:
             *("--reference", str(folder / "scene.tif"), "--reference-sha256", "None"),
             *("--reference-blur", "0.0", "--name", "noise", "--blur", "0.8", "--step", "2"),
             *("--shift-y", "0.0", "--shift-x", "0.0", "--rotation", "0.0"),
+            *("--tilt", "0.0", "--azimuth", "0.0", "--focal-length", "800"),
             *("--noise", *[str(noise)] * N_VIEWS, "--height", "None", "--width", "None"),
             *("--whole", "False", "--guard", "0", "--dtype", "float64", *views),
         ]

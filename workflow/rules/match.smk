@@ -58,6 +58,7 @@ rule match_samplings:
             "samplings.n_spo",
             parameters.Scales,
             parameters.Same,
+            "comparison.soft_ends",
             parameters.Compared,
             parameters.Stable,
         ),
@@ -76,6 +77,7 @@ rule count_refined:
         traces=files("keypoints/traces_n{}.parquet", plan.setting, "samplings.n_spo"),
     output:
         table=f"{HERE}tables/refinement.csv",
+        dead=f"{HERE}tables/dead_range.csv",
     log:
         f"{LOG}count_refined.log",
     benchmark:

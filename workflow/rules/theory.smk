@@ -1,7 +1,8 @@
 """What theory says of blurs, cameras, blobs and noise (sections 2.3, 3.2, 4 and 6.3).
 
-Comes in: settings, and no picture. Goes out: tables/fig1.csv, figS3*.csv, figS4.csv and, beside the
-other tables of figure 12, fig12_theory.csv. Steps: the semigroup property of discrete blurs; the
+Comes in: settings, and for what the text states of views the picture. Goes out: tables/fig1*.csv,
+figS3*.csv, figS4.csv and, beside the other tables of figure 12, fig12_theory.csv;
+aliasing_energy.csv, wrong_blur_identity.csv, zoomed_truth.csv and reference_noise.csv. Steps: the semigroup property of discrete blurs; the
 point spread functions of model cameras and the Gaussians nearest to them; Gaussian blobs of many
 sizes, the scales at which they are detected, and those that closed forms predict; the noise of the
 difference of Gaussians.
@@ -24,11 +25,35 @@ rule semigroup:
         "{params.command} >{log:q} 2>&1"
 
 
+rule sampling_theory:
+    """Beside figure 1: how much blur samplings add, and whether their steps are balanced."""
+    output:
+        table=f"{RESULTS}/tables/fig1_samplings.csv",
+    log:
+        f"{config['logs']}/sampling_theory.log",
+    benchmark:
+        f"{config['logs']}/benchmarks/sampling_theory.tsv"
+    params:
+        **stage(
+            "sampling_theory",
+            "samplings.n_spo",
+            parameters.Scales,
+            parameters.Semigroup,
+            sift_sigma_min=setting("sets.shipped.sigma_min"),
+            sift_delta_min=setting("sets.shipped.delta_min"),
+        ),
+    message:
+        "Comparing the blurs and the steps of the samplings n_spo = {params.n_spo}"
+    shell:
+        "{params.command} >{log:q} 2>&1"
+
+
 rule camera_optics:
     """Figure S3: the Gaussian blur that stands for a lens and its pixels."""
     output:
         table=f"{RESULTS}/tables/figS3.csv",
         profiles=f"{RESULTS}/tables/figS3_profiles.csv",
+        ranges=f"{RESULTS}/tables/figS3_ranges.csv",
     log:
         f"{config['logs']}/camera_optics.log",
     benchmark:
@@ -95,5 +120,39 @@ rule noise_theory:
         ),
     message:
         "Computing the noise of the difference of Gaussians{params.scene}"
+    shell:
+        "{params.command} >{log:q} 2>&1"
+
+
+rule view_statements:
+    """Statements on the camera and on single views: aliasing, wrong blurs, zooms, noise."""
+    input:
+        reference=local(of(plan.setting, "reference")),
+        views=ancient(f"{HERE}views/still"),
+        views_digest=f"{HERE}views/still.sha256",
+    output:
+        aliasing=f"{HERE}tables/aliasing_energy.csv",
+        wrong_blur=f"{HERE}tables/wrong_blur_identity.csv",
+        zoomed=f"{HERE}tables/zoomed_truth.csv",
+        noisy=f"{HERE}tables/reference_noise.csv",
+    log:
+        f"{LOG}view_statements.log",
+    benchmark:
+        f"{BENCHMARK}view_statements.tsv"
+    resources:
+        mem_mb=growing(job_resources.megabytes_of_reference),
+    params:
+        **stage(
+            "view_statements",
+            parameters.Detection,
+            parameters.Refining,
+            parameters.Compared,
+            parameters.Same,
+            parameters.Stated,
+            n_spo=of(plan.finest_curve),
+        ),
+    message:
+        "Measuring aliasing, true extrema at zooms {params.zooms} and noise of the reference"
+        "{params.scene}"
     shell:
         "{params.command} >{log:q} 2>&1"

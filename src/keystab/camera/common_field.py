@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from keystab.camera.views import ViewSpec, to_reference, to_view
+from keystab.camera.views import ViewSpec, local_step, to_reference, to_view, within_line
 
 RIM = 4.0
 """Pixels around what all views have in common in which extrema are sought too."""
@@ -31,8 +31,7 @@ def to_common_frame(
     Returns
     -------
     y, x : ndarray of float64
-        Positions in pixels of the first view. Scales there are longer by
-        ``spec.step / first.step``.
+        Positions in pixels of the first view. Scales there are longer by `zoom_to_common_frame`.
 
     Examples
     --------
@@ -42,6 +41,66 @@ def to_common_frame(
     (4.0, 6.0)
     """
     return to_view(first, reference_shape, *to_reference(spec, reference_shape, y, x))
+
+
+def zoom_to_common_frame(
+    spec: ViewSpec, first: ViewSpec, reference_shape: tuple[int, int], y: ArrayLike, x: ArrayLike
+) -> NDArray[np.float64] | float:
+    """By how much lengths of a view are longer in the first view of its set.
+
+    Parameters
+    ----------
+    spec, first, reference_shape, y, x
+        See `to_common_frame`.
+
+    Returns
+    -------
+    float, or ndarray of float64
+        ``spec.step / first.step``; where planes are seen from the side, the root of the ratio of
+        areas at each position.
+
+    Examples
+    --------
+    >>> first, second = (ViewSpec(1.1, step, (9, 9)) for step in (10.0, 20.0))
+    >>> zoom_to_common_frame(second, first, (100, 100), 4, 5)
+    2.0
+    """
+    if spec.homography is None and first.homography is None:
+        return spec.step / first.step
+    there = to_common_frame(spec, first, reference_shape, y, x)
+    return local_step(spec, y, x) / local_step(first, *there)
+
+
+def zooms_in_common_field(
+    specs: Sequence[ViewSpec], reference_shape: tuple[int, int], margin: float
+) -> tuple[float, float]:
+    """Smallest and largest zoom of any view against the first, where all views look.
+
+    Parameters
+    ----------
+    specs, reference_shape, margin
+        See `in_common_field`.
+
+    Returns
+    -------
+    least, most : float
+        Of planes seen from the side, over the upright rectangles that hold the common field.
+
+    Examples
+    --------
+    >>> specs = [ViewSpec(1.1, step, (20, 20)) for step in (10.0, 15.0)]
+    >>> zooms_in_common_field(specs, (200, 200), 3)
+    (1.0, 1.5)
+    """
+    steps = [np.full(2, spec.step) for spec in specs]
+    if any(spec.homography for spec in specs):
+        windows = windows_of_common_field(specs, reference_shape, margin)
+        steps = [
+            local_step(spec, np.array([[top], [bottom]]), np.array([[left, right]]))
+            for spec, (top, bottom, left, right) in zip(specs, windows, strict=True)
+        ]  # depth is linear: its extremes lie at corners
+    least = min(float(step.min()) for step in steps) / float(steps[0].max())
+    return least, max(float(step.max()) for step in steps) / float(steps[0].min())
 
 
 def in_common_field(
@@ -119,8 +178,7 @@ def windows_of_common_field(
     for spec in specs:
         for axis, size in enumerate(spec.shape):
             for sign, limit in ((1.0, margin), (-1.0, -(size - 1 - margin))):
-                position = to_view(spec, reference_shape, *field.T)[axis]
-                field = _cut(field, sign * position - limit)
+                field = _cut(field, within_line(spec, reference_shape, axis, sign, limit, *field.T))
     if not len(field):
         return [(0.0, -1.0, 0.0, -1.0)] * len(specs)
     windows = []
@@ -190,6 +248,7 @@ def common_scales(
     n_oct: int,
     first_scale: float,
     last_scale: float | None,
+    zooms: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
     """Range of scales that all views of a set cover, in pixels of the first view.
 
@@ -206,6 +265,9 @@ def common_scales(
     last_scale : float or None
         Upper end of it, over `sigma_min`; none if None, unless the views have different zooms:
         then the end of the last octave.
+    zooms : (float, float), optional
+        Smallest and largest zoom against the first view; by default the ratios of steps. Needed
+        where planes are seen from the side, see `zooms_in_common_field`.
 
     Returns
     -------
@@ -219,7 +281,9 @@ def common_scales(
     >>> low, high
     (1.875, 4.0)
     """
-    zooms = [spec.step / specs[0].step for spec in specs]
+    if zooms is None:
+        ratios = [spec.step / specs[0].step for spec in specs]
+        zooms = min(ratios), max(ratios)
     if last_scale is None:
         last_scale = 2.0**n_oct if max(zooms) > min(zooms) else float("inf")
     return sigma_min * first_scale * max(zooms), sigma_min * last_scale * min(zooms)

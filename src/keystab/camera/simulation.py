@@ -4,6 +4,8 @@ A reference picture stands for the scene. A camera of blur c that sees S referen
 of its own takes the view obtained by blurring the reference by c S and sampling it every S
 reference pixels. Both are done on the cosine series of the reference, so that any blur, sub-pixel
 shift and non-integer zoom is exact; only rotations by other than quarter turns interpolate.
+Where a plane is seen from the side, the camera's Gaussian is integrated in the view
+(`keystab.camera.perspective_views`).
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from keystab.camera.perspective import as_homography
+from keystab.camera.perspective_views import integrate, samples_of_view
 from keystab.camera.views import ViewSpec, to_reference
 from keystab.errors import InputError
 from keystab.scalespace import cosine_series
@@ -78,6 +82,7 @@ def simulate_view(
     rotation: float = 0.0,
     noise: float = 0.0,
     seed: int | str | tuple[int | str, ...] | None = None,
+    homography: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
     """Take one view of a reference picture with the simulated camera of section 4.
 
@@ -102,6 +107,9 @@ def simulate_view(
         ``int(size / step)``.
     blur, step, shift, rotation, noise, seed
         See `ViewSpec`.
+    homography : 3 x 3 numbers, optional
+        How a plane is seen from the side, see `ViewSpec` and `keystab.camera.perspective.tilted`.
+        Its limits are those of `keystab.camera.perspective_views.integrate`.
 
     Returns
     -------
@@ -127,7 +135,9 @@ def simulate_view(
     array([[2., 4., 6.]])
     """
     # Other values are refused before the series of the reference is made.
-    spec = ViewSpec(blur, step, (1, 1) if shape is None else shape, shift, rotation, noise, seed)
+    matrix = None if homography is None else as_homography(homography)
+    size = (1, 1) if shape is None else shape
+    spec = ViewSpec(blur, step, size, shift, rotation, noise, seed, matrix)
     if shape is None:
         scene = reference if isinstance(reference, Scene) else Scene(reference)
         return simulate(scene, replace(spec, shape=whole_shape(scene.shape, step)))
@@ -186,7 +196,9 @@ def simulate(reference: Scene | ArrayLike, spec: ViewSpec) -> NDArray[np.float64
     i, j = (np.arange(n, dtype=np.float64) for n in spec.shape)
     blur = spec.blur * spec.step
     quarter_turns = spec.rotation / (math.pi / 2)
-    if quarter_turns != round(quarter_turns):
+    if spec.homography is not None and blur > 0:
+        view = integrate(scene.coefficients, spec)
+    elif quarter_turns != round(quarter_turns) or spec.homography is not None:
         y, x = to_reference(spec, scene.shape, i[:, None], j[None, :])
         view = _interpolate(scene.coefficients, y, x, blur)
     elif round(quarter_turns) % 2 == 0:  # rows of the view run along rows of the reference
@@ -260,8 +272,10 @@ def _check_memory(scene: Scene, spec: ViewSpec) -> None:
     blur = spec.blur * spec.step
     rows, columns = (cosine_series.significant(n, blur) for n in scene.shape)
     height, width = spec.shape
-    bases = 3 * (height * rows + width * columns)
-    products = 3 * height * width + min(height * columns, width * rows)
+    bases = 3.0 * (height * rows + width * columns)
+    products = 3.0 * height * width + min(height * columns, width * rows)
+    if spec.homography is not None and blur > 0:
+        bases, products = 0, samples_of_view(scene.shape, spec)
     memory.require(
         8.0 * (bases + products),
         f"a view of {height} x {width} pixels",

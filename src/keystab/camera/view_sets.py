@@ -12,11 +12,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from keystab.camera.perspective import tilted
 from keystab.camera.views import ViewSpec
 from keystab.errors import InputError
 
-PER_VIEW = ("blur", "step", "shift_y", "shift_x", "rotation", "noise")
-"""What is one number for all views or one number per view."""
+PER_VIEW = ("blur", "step", "shift_y", "shift_x", "rotation", "noise", "tilt", "azimuth")
+"""What is one number for all views or one number per view; tilt and azimuth may be left out."""
 
 #: Value that spreads -> setting that says how far.
 _SPREADS = {
@@ -86,7 +87,8 @@ def per_view(views: Mapping[str, Any]) -> dict[str, list[float]]:
     ----------
     views : mapping
         The description of a set. Lists of length 1 count as single numbers. ``n_views``,
-        ``shift_spread``, ``rotation_spread``, ``blur_spread`` and ``zoom`` may be left out.
+        ``shift_spread``, ``rotation_spread``, ``blur_spread``, ``zoom``, ``tilt`` and ``azimuth``
+        may be left out.
 
     Returns
     -------
@@ -107,6 +109,7 @@ def per_view(views: Mapping[str, Any]) -> dict[str, list[float]]:
     >>> per_view({"blur": 1.1, "step": 10.0, **rest, "n_views": 3, "shift_spread": 0.5})["shift_y"]
     [0.0, -0.25, 0.25]
     """
+    views = {"tilt": 0.0, "azimuth": 0.0, **views}
     lists = {key: _as_list(views[key]) for key in PER_VIEW}
     lengths = {key: len(values) for key, values in lists.items() if len(values) != 1}
     if views.get("n_views", 1) > 1:
@@ -205,7 +208,8 @@ def view_specs(
         Name of the set; with the number of the view it seeds the noise, so that noise depends on
         neither the order nor the number of the views.
     views : mapping
-        The description of the set.
+        The description of the set. Views with a ``tilt`` above 0 see the scene from the side, at
+        ``focal_length``.
     reference_shape : tuple of int
         Height and width of the reference in pixels.
 
@@ -227,9 +231,16 @@ def view_specs(
     """
     values = per_view(views)
     shapes = view_shapes(views, reference_shape)
-    return [
-        ViewSpec(blur, step, shape, (shift_y, shift_x), rotation, noise, (name, number))
-        for number, (shape, blur, step, shift_y, shift_x, rotation, noise) in enumerate(
-            zip(shapes, *(values[key] for key in PER_VIEW), strict=True)
+    focal_length = views.get("focal_length", 0.0)
+    specs = []
+    for number, shape in enumerate(shapes):
+        own = {key: values[key][number] for key in PER_VIEW}
+        aside = own["tilt"] > 0
+        seen = tilted(own["tilt"], own["azimuth"], focal_length) if aside else None
+        shift, seed = (own["shift_y"], own["shift_x"]), (name, number)
+        specs.append(
+            ViewSpec(
+                own["blur"], own["step"], shape, shift, own["rotation"], own["noise"], seed, seen
+            )
         )
-    ]
+    return specs

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from keystab.camera import perspective
 from keystab.errors import InputError
 
-__all__ = ["ViewSpec", "effective_blur", "to_reference", "to_view"]
+__all__ = ["ViewSpec", "effective_blur", "local_step", "to_reference", "to_view"]
 
 #: Lengths in reference pixels from which on float64 tells no half pixels apart.
 _FARTHEST = 2.0**52
@@ -38,12 +39,17 @@ class ViewSpec:
         Standard deviation of white Gaussian noise, in units of the range [0, 1].
     seed : int, str or tuple of them, optional
         What the noise is for, for `random_generator`. Needed where there is noise.
+    homography : 3 x 3 numbers, optional
+        How the camera sees a plane from the side, `keystab.camera.perspective`: it takes positions
+        from the centre of the view, (down, right) with the shift, to the plane, before rotation
+        and step. None looks straight at it.
 
     Raises
     ------
     InputError
-        If a value is out of its range, there is noise without a seed, or the blur or the farthest
-        position is 2**52 reference pixels or more, where float64 tells no half pixels apart.
+        If a value is out of its range, there is noise without a seed, the view sees the horizon of
+        the plane, or the blur or the farthest position is 2**52 reference pixels or more, where
+        float64 tells no half pixels apart.
 
     Examples
     --------
@@ -58,6 +64,7 @@ class ViewSpec:
     rotation: float = 0.0
     noise: float = 0.0
     seed: int | str | tuple[int | str, ...] | None = None
+    homography: perspective.Homography | None = None
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -83,6 +90,24 @@ class ViewSpec:
             raise InputError(f"shape is {self.shape}; give a height and a width of 1 pixel or more")
         self._check_lengths()
         self._check_seed()
+        if self.homography is not None:
+            object.__setattr__(self, "homography", perspective.as_homography(self.homography))
+            self._check_horizon(self.homography)
+
+    def _check_horizon(self, homography: perspective.Homography) -> None:
+        """Refuse a plane that ends within the view; its horizon is a line."""
+        # The camera's Gaussian blur reaches a little beyond the outermost pixels.
+        reach = 0.5 + perspective.REACH * self.blur
+        down, right = (
+            np.array([shift - n / 2 - reach, shift + n / 2 + reach])
+            for n, shift in zip(self.shape, self.shift, strict=True)
+        )
+        depth = perspective.homogeneous(homography, down[:, None], right[None, :])[2]
+        if not (depth > 1e-6 * np.abs(np.array(homography)).max()).all():
+            raise InputError(
+                "homography: the view reaches the horizon of the plane; tilt it less, or give a "
+                "smaller shape"
+            )
 
     def _check_lengths(self) -> None:
         step = float(self.step)
@@ -147,6 +172,8 @@ def to_reference(
     (mid_y, mid_x), (ref_y, ref_x) = _centre(spec.shape), _centre(reference_shape)
     down = np.asarray(y, dtype=np.float64) - mid_y + spec.shift[0]
     right = np.asarray(x, dtype=np.float64) - mid_x + spec.shift[1]
+    if spec.homography is not None:
+        down, right = perspective.to_plane(spec.homography, down, right)
     # y points down, so a counter-clockwise turn takes "right" towards smaller y.
     return (
         ref_y + spec.step * (cos * down - sin * right),
@@ -184,7 +211,86 @@ def to_view(
     (mid_y, mid_x), (ref_y, ref_x) = _centre(spec.shape), _centre(reference_shape)
     dy = (np.asarray(y, dtype=np.float64) - ref_y) / spec.step
     dx = (np.asarray(x, dtype=np.float64) - ref_x) / spec.step
-    return mid_y - spec.shift[0] + cos * dy + sin * dx, mid_x - spec.shift[1] - sin * dy + cos * dx
+    if spec.homography is None:
+        return (
+            mid_y - spec.shift[0] + cos * dy + sin * dx,
+            mid_x - spec.shift[1] - sin * dy + cos * dx,
+        )
+    back = perspective.inverse(spec.homography)
+    down, right = perspective.to_plane(back, cos * dy + sin * dx, cos * dx - sin * dy)
+    return mid_y - spec.shift[0] + down, mid_x - spec.shift[1] + right
+
+
+def within_line(
+    spec: ViewSpec,
+    reference_shape: tuple[int, int],
+    axis: int,
+    sign: float,
+    limit: float,
+    y: ArrayLike,
+    x: ArrayLike,
+) -> NDArray[np.float64]:
+    """How far places of the reference lie within a row or a column of a view, as a linear function.
+
+    Parameters
+    ----------
+    spec, reference_shape, y, x
+        See `to_view`.
+    axis : {0, 1}
+        Rows or columns.
+    sign, limit : float
+        Wanted is ``sign * position >= limit`` along the axis.
+
+    Returns
+    -------
+    ndarray of float64
+        ``sign * position - limit`` in view pixels, times the depth where a plane is seen from the
+        side: linear in the place, and negative behind the camera for one of two opposite lines.
+
+    Examples
+    --------
+    >>> spec = ViewSpec(blur=1.0, step=10.0, shape=(225, 400))
+    >>> within_line(spec, (2250, 4000), 1, -1.0, -390.0, 4.5, [4.5, 3994.5]).tolist()
+    [390.0, -9.0]
+    """
+    if spec.homography is None:
+        return sign * to_view(spec, reference_shape, y, x)[axis] - limit
+    straight = replace(spec, homography=None, shift=(0.0, 0.0))
+    middle = _centre(spec.shape)
+    y, x = to_view(straight, reference_shape, y, x)
+    back = perspective.inverse(spec.homography)
+    *position, depth = perspective.homogeneous(back, y - middle[0], x - middle[1])
+    centre = middle[axis] - spec.shift[axis]
+    return sign * position[axis] + (sign * centre - limit) * depth
+
+
+def local_step(spec: ViewSpec, y: ArrayLike, x: ArrayLike) -> NDArray[np.float64]:
+    """Reference pixels per pixel of a view, at positions of the view; S where it looks straight.
+
+    Parameters
+    ----------
+    spec : ViewSpec
+        The view.
+    y, x : array_like
+        Positions in view pixels; shapes that broadcast.
+
+    Returns
+    -------
+    ndarray of float64
+        Of a plane that is seen from the side, the root of the area of the reference that a pixel
+        sees.
+
+    Examples
+    --------
+    >>> local_step(ViewSpec(blur=1.1, step=10.0, shape=(20, 20)), 3.0, [4.0, 5.0]).tolist()
+    [10.0, 10.0]
+    """
+    (mid_y, mid_x), steps = _centre(spec.shape), np.full(np.broadcast(y, x).shape, spec.step)
+    if spec.homography is None:
+        return steps
+    down = np.asarray(y, dtype=np.float64) - mid_y + spec.shift[0]
+    right = np.asarray(x, dtype=np.float64) - mid_x + spec.shift[1]
+    return steps * perspective.zoom(spec.homography, down, right)
 
 
 def effective_blur(blur: float, step: float, reference_blur: float) -> float:

@@ -21,6 +21,7 @@ from keystab.evaluation.intervals import (
     table_counts,
     wilson_interval,
 )
+from keystab.matching.common_range import compared
 from keystab.matching.correspondence import SCALE_RATIO, SPACE_TOLERANCE, matched
 from keystab.matching.unique_keypoints import gather, set_codes, set_names
 
@@ -182,7 +183,8 @@ def new_and_lost(
     Parameters
     ----------
     detections : DataFrame
-        Detections of all sets.
+        Detections of all sets; those beyond the range that is compared are counterparts only
+        (`keystab.matching.common_range.compared`).
     space_tolerance, scale_ratio, match_sign
         See `keystab.matching.correspondence.same`.
     set_column : str
@@ -206,12 +208,13 @@ def new_and_lost(
     names = set_names(detections, set_column, sets)
     codes = set_codes(detections, set_column, names)
     tables = [detections[codes == i] for i in range(len(names))]
-    total = np.array([len(table) for table in tables])
+    asked = [table[compared(table)] for table in tables]
+    total = np.array([len(table) for table in asked])
     counts = {"new": np.full(len(names), np.nan), "lost": np.full(len(names), np.nan)}
     for i in range(1, len(names)):
         pair = (space_tolerance, scale_ratio, match_sign)
-        counts["new"][i] = np.sum(~matched(tables[i], tables[i - 1], *pair))
-        counts["lost"][i - 1] = np.sum(~matched(tables[i - 1], tables[i], *pair))
+        counts["new"][i] = np.sum(~matched(asked[i], tables[i - 1], *pair))
+        counts["lost"][i - 1] = np.sum(~matched(asked[i - 1], tables[i], *pair))
     result: dict[str, Any] = {set_column: names, "n_detections": total}
     for name, count in counts.items():
         known = ~np.isnan(count)

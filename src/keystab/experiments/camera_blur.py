@@ -84,6 +84,79 @@ def optics_table(
     return pd.DataFrame(rows)
 
 
+def range_table(
+    f_numbers: Sequence[float],
+    pitches: Sequence[float],
+    confusions: Sequence[float],
+    wavelength: float = 0.55,
+    fill_factor: float = 1.0,
+    shares: Sequence[float] = (0.0, 0.25, 0.5, 0.75, 1.0),
+) -> pd.DataFrame:
+    """Compute between which camera blurs a camera that counts as in focus may lie (section 4).
+
+    A camera is focused at its largest aperture, of f-number N, where a sensor that is off by z
+    makes a disc of diameter z / N of a point. Photographers call that sharp up to a diameter that
+    belongs to the size of the sensor, the circle of confusion d: a sensor up to N d off the focus
+    is in focus. The error stays when the lens is stopped down.
+
+    Parameters
+    ----------
+    f_numbers, pitches, wavelength, fill_factor
+        See `optics_table`.
+    confusions : sequence of float
+        Circles of confusion d in micrometres: 30 for sensors of 24 mm x 36 mm, 20 for those of two
+        thirds of the size.
+    shares : sequence of float, default 0 to 1 by quarters
+        Focus errors in units of the largest that counts as in focus, >= 0.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per pitch, circle of confusion and share: ``pitch``, ``confusion``, ``share``, the
+        focus error ``defocus`` (all lengths in micrometres); the ``smallest`` and the ``largest``
+        camera blur over all apertures, in pixels, and the f-numbers ``f_smallest, f_largest`` that
+        have them.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range.
+
+    Examples
+    --------
+    >>> table = range_table([1.4, 5.6], [6.5], [20.0], shares=[0.0, 1.0])
+    >>> table[["defocus", "smallest", "largest"]].round(2).to_numpy().tolist()
+    [[0.0, 0.36, 0.4], [28.0, 0.41, 0.95]]
+    """
+    import pandas as pd
+
+    _check_lists(f_numbers=f_numbers, pitches=pitches, confusions=confusions)
+    rows = []
+    for pitch in pitches:
+        for confusion in confusions:
+            for share in shares:
+                defocus = validation.number("shares", share, least=0) * confusion * min(f_numbers)
+                lens = (wavelength, fill_factor)
+                blurs = [
+                    fit_camera(camera("defocus", lens[0], n, pitch, lens[1], defocus)).blur
+                    for n in f_numbers
+                ]
+                least, most = int(np.argmin(blurs)), int(np.argmax(blurs))
+                rows.append(
+                    {
+                        "pitch": float(pitch),
+                        "confusion": float(confusion),
+                        "share": float(share),
+                        "defocus": float(defocus),
+                        "smallest": blurs[least],
+                        "largest": blurs[most],
+                        "f_smallest": float(f_numbers[least]),
+                        "f_largest": float(f_numbers[most]),
+                    }
+                )
+    return pd.DataFrame(rows)
+
+
 def profile_table(
     f_number: float,
     pitch: float,

@@ -78,7 +78,8 @@ def write_views(
     -----
     The array ``image`` has the dimensions (view, y, x). Views of different shapes share it:
     smaller ones are filled up with NaN at the bottom and right, and ``height`` and ``width`` say
-    how much of each counts. `view` cuts it out.
+    how much of each counts. `view` cuts it out. Where planes are seen from the side, the attribute
+    ``homographies`` holds one 3 x 3 matrix, or null, for each view.
     """
     if not specs:
         raise InputError("a set of views is empty; give at least one view")
@@ -95,8 +96,11 @@ def write_views(
         "height": ([spec.shape[0] for spec in specs], "height of the view in pixels"),
         "width": ([spec.shape[1] for spec in specs], "width of the view in pixels"),
     }
+    attributes = dict(attributes or {})
+    if any(spec.homography for spec in specs):  # nothing more is written of other views
+        attributes["homographies"] = [spec.homography for spec in specs]
     with written_whole(Path(path) / GROUP_NAME) as part:
-        group = new_group(part, "views", attributes or {})
+        group = new_group(part, "views", attributes)
         for name, (values, meaning) in columns.items():
             number = np.int64 if name in ("height", "width") else np.float64
             write_column(group, name, np.asarray(values, dtype=number), "view", meaning)
@@ -260,6 +264,7 @@ class Views:
     def specs(self) -> list[ViewSpec]:
         """How each view was taken."""
         numbers = {name: values.tolist() for name, values in self._views.columns.items()}
+        sides = self._views.attributes.get("homographies", [None] * len(self))
         return [
             ViewSpec(
                 numbers["blur"][k],
@@ -269,6 +274,7 @@ class Views:
                 numbers["rotation"][k],
                 numbers["noise"][k],
                 (str(self._views.attributes["set"]), k),
+                sides[k],
             )
             for k in range(len(self))
         ]

@@ -62,10 +62,18 @@ Comparison
     cubes : table of their samples
     curve_n_spo : samplings whose curves are drawn
     iterations : further values of N_interp
+    tilts : tilt of each view, where those of one tilt are matched by themselves
+    unit : first scale of the octave in whose pixels others are compared too; 0 for none
+    pairs : table of what becomes of the keypoints of the first view in the others
+    interpolation : table of how stable the interpolation is
+    dead : table of what is detected less than half a step above the first scale
     minimum_share : least share of the views that see a keypoint whose precision counts
     curves : table of curves of stability
     precision : table of precisions
+    differences : table of what two choices of keypoints differ by
+    edges : table of spreads along edges and across
     scales : table of counts against scale
+    soft_ends : whether counterparts may lie beyond the ends of the range of scales
     border : pixels left out at the border of the view
     assumed_blur : camera blur that was assumed, pixels
     kappa : ratio of the two blurs
@@ -109,8 +117,15 @@ Audits
     audits_by_phase : tables of errors against the sub-pixel phase
 
 Theory
+    sift_sigma_min : first scale of SIFT as shipped, pixels
+    sift_delta_min : sampling step of SIFT as shipped, pixels
     profiles : table of profiles of point spread functions
     camera_blur : camera blur, pixels
+    ranges : table of the camera blurs between which cameras in focus lie
+    aliasing : table of the aliased part of views
+    wrong_blur : table of scale-spaces of a wrong blur, against dilated ones
+    zoomed : table of true extrema of zoomed views, against each other
+    noisy : table of what noise of the reference changes
     n_oct : octaves
 
 Claims and results

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.camera.common_field import common_scales
+from keystab.camera.common_field import common_scales, zooms_in_common_field
 from keystab.io.view_store import Views
 from keystab.matching.common_range import CommonRange, comparable
 from keystab.parameters import Compared, ComparedInViews
@@ -25,8 +25,9 @@ def inside(compared: Compared, sigma_min: float, shape: tuple[int, int]) -> Insi
     return rows
 
 
-def common_range(views: Views, compared: ComparedInViews) -> CommonRange:
+def common_range(views: Views, compared: ComparedInViews, soft_ends: bool = False) -> CommonRange:
     """Field of view and range of scales that all views of a set have in common."""
-    it, specs = compared, views.specs
-    scales = common_scales(specs, it.sigma_min, it.n_oct, it.first_scale, it.last_scale)
-    return CommonRange(specs, views.reference_shape, max(it.guard, it.border), *scales)
+    it, specs, margin = compared, views.specs, max(compared.guard, compared.border)
+    zooms = zooms_in_common_field(specs, views.reference_shape, margin)
+    scales = common_scales(specs, it.sigma_min, it.n_oct, it.first_scale, it.last_scale, zooms)
+    return CommonRange(specs, views.reference_shape, margin, *scales, soft_ends)

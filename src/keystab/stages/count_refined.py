@@ -18,12 +18,14 @@ def main(
     accepted: Acceptance,
     *,
     table: Path,
+    dead: Path,
 ) -> None:
-    """Read extrema and refinement traces; write one row per sampling."""
+    """Read extrema and refinement traces; write one row per sampling into either table."""
     import pandas as pd
 
     from keystab.detection.refinement import accepted as accepted_models
     from keystab.detection.refinement import positions
+    from keystab.experiments.dead_range import dead_range_row
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling
@@ -32,9 +34,9 @@ def main(
     view = read_view(*views)
     everywhere = inside(compared, scales.sigma_min, view.shape)
     octave = inside(replace(compared, last_scale=2.0), scales.sigma_min, view.shape)
-    rows = []
+    rows, below = [], []
     for n, extrema_path, traces_path in zip(n_spo, samplings, traces, strict=True):
-        extrema = read_table(extrema_path, ["y", "x", "step_sigma"])
+        extrema = read_table(extrema_path, ["y", "x", "sigma", "step_sigma"])
         sampling = Sampling.balanced(view.shape, view.blur, n, **vars(scales))
         refined = positions(accepted_models(read_table(traces_path), **vars(accepted)), sampling)
         rows.append(
@@ -48,4 +50,6 @@ def main(
                 "n_refined_octave": octave(refined, "sigma").sum(),
             }
         )
+        below.append(dead_range_row(extrema["sigma"], refined["sigma"], n, scales.sigma_min))
     write_table(pd.DataFrame(rows), table)
+    write_table(pd.DataFrame(below), dead)

@@ -17,6 +17,7 @@ def main(
     border: float,
     same: Same,
     accepted: Acceptance,
+    soft_ends: bool = False,
     *,
     counts: Path,
     keypoints: Path,
@@ -30,7 +31,8 @@ def main(
 
     view = read_view(*views)
     refined = refined_keypoints(read_table(extrema), read_table(traces), **vars(accepted))
-    tables = kappa_tables(refined, kappas, n_spo, sigma_min, view.shape, border, vars(same))
+    how = (vars(same), soft_ends)
+    tables = kappa_tables(refined, kappas, n_spo, sigma_min, view.shape, border, *how)
     write_table(tables.counts, counts)
     write_table(tables.keypoints, keypoints)
     write_table(tables.occurrence, occurrence)

@@ -15,6 +15,7 @@ def main(
     same: Same,
     compared: Compared,
     stable: Stable,
+    soft_ends: bool = False,
     *,
     matches: Path,
     counts: Path,
@@ -26,13 +27,13 @@ def main(
     from keystab.experiments import sampling_stability as tables
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
+    from keystab.matching.common_range import in_range
     from keystab.scalespace.sampling import balanced_delta
-    from keystab.stages._compared import inside
     from keystab.stages._tables import read_extrema
 
     extrema, how = read_extrema(samplings), vars(same)
     shape = read_view(*views).shape
-    common = extrema[inside(compared, scales.sigma_min, shape)(extrema, "step_sigma")]
+    common = in_range(extrema, "step_sigma", shape, scales.sigma_min, soft_ends, **vars(compared))
     matched = tables.keypoints_of_samplings(common, n_spo, how)
     reverse = tables.keypoints_of_samplings(common, n_spo, how, reverse_order=True)
     pairs = tables.long_matches(matched, n_spo, common["row_in_file"].to_numpy())

@@ -13,7 +13,7 @@ from keystab.camera.view_sets import assumed_blur, expanded, per_view
 from keystab.camera.views import effective_blur
 from keystab.errors import InputError
 from keystab.study.picture_checks import Settings, picture_problems, still_blur
-from keystab.study.plan import FIGURES, kept_n_spo
+from keystab.study.plan import FIGURES, STATED_SWEEPS, kept_n_spo
 from keystab.study.result_folders import path_problems
 from keystab.study.settings import refuse
 
@@ -25,6 +25,7 @@ ONCE_SEARCHED = {"shipped": "figure 7", "blur_errors": "figure S2"}
 
 SEARCHED_SETS = (
     *(about.views for about in FIGURES.values() if about.views and not about.swept),
+    "translations_wide",  # with which figure 8 is compared
     *ONCE_SEARCHED,
 )
 """Sets of views that are searched for keypoints."""
@@ -33,7 +34,7 @@ SWEPT_SETS = {
     about.views: (name.replace("fig", "figure "), about.swept)
     for name, about in FIGURES.items()
     if about.swept
-}
+} | {name: ("what the claims ask", key) for name, key in STATED_SWEEPS.items()}
 """Sweeps of sets of views that are searched: what is made of them, and what they differ in."""
 
 
@@ -82,7 +83,7 @@ def sweep_problems(settings: Settings) -> list[str]:
             problems.append(
                 f"sets.{name}.sweep has {swept}, allowed is {key}: {figure} is made from it"
             )
-        elif len(views["n_spo"]) != 1:
+        elif len(views["n_spo"]) != 1 and name != "unbalanced":
             problems.append(
                 f"sets.{name}.n_spo is {views['n_spo']}, allowed is one sampling for {figure}"
             )

@@ -11,13 +11,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from keystab.camera.common_field import common_field_is_empty, common_scales
+from keystab.camera.common_field import (
+    common_field_is_empty,
+    common_scales,
+    zooms_in_common_field,
+)
 from keystab.camera.view_sets import per_view, view_shapes, view_specs
 from keystab.camera.views import effective_blur
 from keystab.errors import InputError
 from keystab.io.pictures import picture_shape
 from keystab.scalespace.sampling import Sampling, balanced_delta
-from keystab.study.plan import kept_n_spo
+from keystab.study.plan import kept_n_spo, last_scale
 from keystab.study.scenes import further_pictures
 from keystab.utils.memory import in_words
 
@@ -70,7 +74,7 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
         for name, views in settings["sets"].items()
         for line in fit_problems(name, views, shape, border)
     ]
-    if len(problems) == len(settings["sets"]):  # not the sets are to blame
+    if 2 * len(problems) > len(settings["sets"]):  # not the sets are to blame
         of_border = _border_problems(settings["sets"], shape, border)
         if of_border:
             return of_border
@@ -146,22 +150,22 @@ def common_problems(
     own = views["sigma_min"]
     sigma_min = settings["detector"]["sigma_min"] if own is None else own
     specs = view_specs(name, views, reference_shape)
-    moves = len({(spec.step, spec.shift, spec.rotation) for spec in specs}) > 1
+    moves = len({(spec.step, spec.shift, spec.rotation, spec.homography) for spec in specs}) > 1
     needed = math.ceil(6 * sigma_min * 2 ** views["n_oct"])
     if moves and views["guard"] < needed:
         return [
             f"sets.{name}.guard is {views['guard']}, allowed is at least {needed}: 6 times the "
             f"largest scale of its {views['n_oct']} octave(s), or borders enter the comparison"
         ]
-    low, high = common_scales(
-        specs, sigma_min, views["n_oct"], comparison["first_scale"], comparison["last_scale"]
-    )
+    margin = max(views["guard"], comparison["border"])
+    zooms = zooms_in_common_field(specs, reference_shape, margin)
+    ends = (comparison["first_scale"], last_scale(settings, name))
+    low, high = common_scales(specs, sigma_min, views["n_oct"], *ends, zooms)
     if low >= high:
         return [
             f"sets.{name} leaves no common range of scales: the last view begins at {low:.3g} px "
             f"of the first, which ends at {high:.3g} px; give a smaller zoom or more octaves"
         ]
-    margin = max(views["guard"], comparison["border"])
     if common_field_is_empty(specs, reference_shape, margin):
         return [
             f"sets.{name} leaves no common field of view: no pixel of the first view of "

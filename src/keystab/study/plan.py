@@ -61,11 +61,13 @@ FIGURES = {
     # stability and precision when the camera rotates
     "figS1": Figure(("figS1_curves.csv", "figS1_precision.csv"), "rotations"),
     # a wrong blur, by its sign
-    "figS2": Figure(("figS2.csv",)),
+    "figS2": Figure(("figS2.csv", "blur_zooms_pairs.csv")),
     # the blur of a real camera
     "figS3": Figure(("figS3.csv", "figS3_profiles.csv"), of_scene=False),
     # blobs, whose scale is known
     "figS4": Figure(("figS4.csv",), of_scene=False),
+    # stability and precision when the scene is seen from the side
+    "figS5": Figure(("figS5_counts.csv", "figS5_precision.csv"), "tilts"),
     # why extrema come and go at any density
     "floor": Figure(
         (
@@ -107,8 +109,14 @@ FIGURES = {
 }
 """The figures in their order: what each shows, and the tables and sets that it is made from."""
 
-TABLES_NOT_DRAWN = ("fig5_features.csv", "refinement.csv")
+STATED_SWEEPS = {"blur_zooms": "assumed_blur", "unbalanced": "delta_min", "large_scales": "noise"}
+"""Sweeps of sets of views that answer statements of the text, and what their sets differ in."""
+
+TABLES_NOT_DRAWN = ("fig8_translations.csv", "refinement.csv")
 """Tables of a scene that no figure draws and no claim needs."""
+
+TABLES_OF_THEORY = ("fig1_samplings.csv", "figS3_ranges.csv")
+"""Tables of no scene that no figure draws and claims need."""
 
 TABLES_OF_SCENES = ("predictors_detections.parquet",)
 """The same, of several scenes together."""
@@ -145,7 +153,7 @@ def figures_of_views(swept: bool, against_scale: bool = False) -> str:
     Examples
     --------
     >>> figures_of_views(swept=False), figures_of_views(swept=True, against_scale=True)
-    ('fig7|fig8|figS1', 'fig11|fig12')
+    ('fig7|fig8|figS1|figS5', 'fig11|fig12')
     """
     names = [
         name
@@ -175,6 +183,55 @@ def sets_of_figure(settings: Settings, figure: str) -> list[str]:
     return list(settings["sweeps"].get(views, [views]))
 
 
+def searches_of_sweep(settings: Settings, sweep: str) -> list[Searched]:
+    """Sets of a sweep that no figure is about, at all their samplings."""
+    return searches(settings, *settings["sweeps"][sweep])
+
+
+def stated_key(_settings: Settings, sweep: str) -> str:
+    """Name of what the sets of such a sweep differ in."""
+    return STATED_SWEEPS[sweep]
+
+
+def last_scale(settings: Settings, name: str) -> float | None:
+    """Upper end of the scales that are compared in a set or a sweep of sets, over its first scale.
+
+    Where views see the scene at zooms that differ by much, or large octaves are asked for, that is
+    the end of their octaves, whatever that of other comparisons is.
+    """
+    to_the_end = name.startswith(("tilts", "blur_zooms", "large_scales"))
+    end: float | None = None if to_the_end else settings["comparison"]["last_scale"]
+    return end
+
+
+def last_scale_of_figure(settings: Settings, figure: str) -> float | None:
+    """Such an end for the set of views that a figure studies."""
+    return last_scale(settings, sets_of_figure(settings, figure)[0])
+
+
+def octaves_of_sweep(settings: Settings, sweep: str) -> list[float]:
+    """First scales of the octaves in which the sets of a sweep are searched."""
+    views = settings["sets"][next(iter(settings["sweeps"][sweep]))]
+    return [views["sigma_min"] * 2.0**octave for octave in range(views["n_oct"])]
+
+
+def curve_n_spo(settings: Settings, figure: str) -> list[int]:
+    """Samplings whose curves a figure of views has; of tilted views all that are searched."""
+    name = "sets.tilts.n_spo" if figure == "figS5" else "stability.curve_n_spo"
+    return list(setting(settings, name))
+
+
+def finest_curve(settings: Settings) -> int:
+    """Scales per octave of the finest sampling whose curves are drawn."""
+    n_spo: int = max(settings["stability"]["curve_n_spo"])
+    return n_spo
+
+
+def tilts(settings: Settings, figure: str) -> list[float]:
+    """Tilt of every view of a figure that matches the views of each tilt by themselves."""
+    return settings["sets"]["tilts"]["tilt"] if figure == "figS5" else []
+
+
 def swept(_settings: Settings, figure: str) -> str:
     """Name of what the sets of the sweep that a figure studies differ in."""
     return FIGURES[figure].swept
@@ -194,6 +251,17 @@ def searches(settings: Settings, *sets: str) -> list[Searched]:
 def searches_of_figure(settings: Settings, figure: str) -> list[Searched]:
     """Sets of views that a figure studies, at all their samplings; of a sweep, each at one."""
     return searches(settings, *sets_of_figure(settings, figure))
+
+
+def scales_of_zooms(settings: Settings, end: int) -> float:
+    """One end of the range of scales that all views of figure 8 cover, over their first scale."""
+    views, comparison = settings["sets"]["zooms"], settings["comparison"]
+    zooms = [step / views["step"][0] for step in views["step"]]
+    ends = (
+        max(zooms) * comparison["first_scale"],
+        comparison["last_scale"] or 2.0 ** views["n_oct"],
+    )
+    return float(ends[end])
 
 
 def compared_with_scene(settings: Settings) -> list[Searched]:
@@ -360,6 +428,7 @@ def table_files(place: str, results: str, names: Iterable[str]) -> list[str]:
     ['results/tables/fig1.csv', 'results/scenes/stream/tables/fig3.csv']
     """
     once = {table for figure in FIGURES.values() if not figure.of_scene for table in figure.tables}
+    once |= set(TABLES_OF_THEORY)
     return [f"{results}/{'' if name in once else place}tables/{name}" for name in names]
 
 

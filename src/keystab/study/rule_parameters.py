@@ -206,7 +206,8 @@ class Rules:
             Module in `keystab.stages`.
         *blocks : type or str
             Blocks of `keystab.parameters` and places of single settings that it takes. In a place,
-            ``{set}`` is the wildcard or the set that the wildcard ``figure`` studies.
+            ``{set}`` is the wildcard, or the set that the wildcard ``figure`` studies, or the first
+            of those of the wildcard ``sweep``.
         of_set : str, optional
             The set where no wildcard says it.
         **given
@@ -276,6 +277,8 @@ class Rules:
         settings = self.scenes[names["place"]]
         if "figure" in names:
             names.setdefault("set", sets_of_figure(settings, names["figure"])[0])
+        elif "sweep" in names:
+            names.setdefault("set", next(iter(settings["sweeps"][names["sweep"]])))
         return settings, names
 
     def _scene(self, wildcards: Any, input: Any) -> str:

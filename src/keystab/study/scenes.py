@@ -85,7 +85,7 @@ def further_pictures(settings: Settings, folder: Path | str = ".") -> list[str]:
 _PLAIN_VIEW = {
     "shift_y": 0.0, "shift_x": 0.0, "rotation": 0.0, "noise": 0.0, "height": None, "width": None,
     "dtype": None, "n_views": 1, "shift_spread": 0.0, "rotation_spread": 0.0, "blur_spread": 0.0,
-    "zoom": 1.0, "whole": False, "guard": 0,
+    "zoom": 1.0, "whole": False, "guard": 0, "tilt": 0.0, "azimuth": 0.0, "focal_length": 800.0,
 }  # fmt: skip
 
 

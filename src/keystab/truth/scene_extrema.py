@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from keystab.camera.simulation import Scene, simulate
 from keystab.camera.views import ViewSpec, to_reference, to_view
+from keystab.errors import InputError
 from keystab.scalespace.continuous_dog import DogSeries
 from keystab.scalespace.local_dog import LocalDog
 from keystab.truth.newton import folded, range_of_climbs
@@ -114,6 +115,11 @@ def scene_extrema(
     [9.05, 8.55, 1.781797]
     """
     scene = reference if isinstance(reference, Scene) else Scene(reference)
+    if spec.homography is not None:
+        raise InputError(
+            "the view sees the scene from the side, allowed are views that look straight at it: "
+            "no scale of the scene is that of such a view"
+        )
     own_blur = validation.number("reference_blur", reference_blur, least=0)
     check_scales(own_blur / spec.step, sigma_min, sigma_max, kappa)
     samplings = listed(n_spo)
