@@ -22,7 +22,12 @@ LEDGER = ROOT / "config/claims.yaml"
 LISTED = claims.read_claims(LEDGER)
 
 RATES = pd.DataFrame(
-    {"n_spo": [15, 3, 5], "rate": [0.1, 0.4, 0.2], "low": [0.08, 0.3, 0.1], "high": [0.2, 0.5, 0.3]}
+    {
+        "n_spo": [15, 3, 5],
+        "rate": [0.1, 0.4, 0.2],
+        "low": [0.09, 0.3, 0.1],
+        "high": [0.11, 0.5, 0.3],
+    }
 )
 TABLES = {"rates": RATES}
 
@@ -136,7 +141,7 @@ def test_nothing_else_can_be_said(expression, says):
         ("rate", "largest_step n_spo", "", -0.1),
         ("rate", "smallest_step n_spo", "", -0.2),
         ("rate > 0.15", "share", "", 2 / 3),
-        ("1 - rate / high", "max", "", 0.5),
+        ("1 - rate / high", "max", "", 1 / 3),
     ],
 )
 def test_takes(column, take, rows, value):
@@ -144,10 +149,46 @@ def test_takes(column, take, rows, value):
 
 
 def test_intervals_are_those_of_the_row_that_is_taken():
-    assert taken("rate", "last n_spo", low="low", high="high")[:3] == (0.1, 0.08, 0.2)
+    assert taken("rate", "last n_spo", low="low", high="high")[:3] == (0.1, 0.09, 0.11)
     assert taken("rate", "max", low="low", high="high")[:3] == (0.4, 0.3, 0.5)
     share = taken("rate > 0.15", "share")
     assert 0 < share.low < share.value < share.high < 1
+
+
+def test_steps_have_the_interval_of_their_two_rows():
+    step = taken("rate", "largest_step n_spo", low="low", high="high")
+    assert step.value == pytest.approx(-0.1)
+    assert (step.low, step.high) == pytest.approx(
+        (-0.1 - np.hypot(0.01, 0.1), -0.1 + np.hypot(0.01, 0.1))
+    )
+    assert (step.extreme, step.chosen_from) == ("max", 2)
+
+
+def test_extremes_say_of_how_many_they_are_the_largest():
+    assert taken("rate", "max")[4:] == ("max", 3) and taken("rate", "last n_spo")[4:] == ("", 1)
+
+
+def test_ends_may_be_expressions():
+    lost = taken("1 - rate", "last n_spo", low="1 - high", high="1 - low")
+    assert lost[:3] == pytest.approx((0.9, 0.89, 0.91))
+
+
+def test_samples_have_the_interval_that_their_number_allows():
+    tables = {"rates": pd.DataFrame({"x": np.arange(101.0), "n": 4, "group": np.arange(101) // 2})}
+
+    def of(column, take, by=""):
+        given = claims.Quantity("q", tables=("rates",), column=column, take=take, by=by)
+        return verdicts.measured(given, tables)[:3]
+
+    assert of("x", "sample_median") == (50, 39, 60)
+    half = 1.96 * np.std(np.arange(101), ddof=1) / np.sqrt(101)
+    assert of("x", "sample_mean") == pytest.approx((50, 50 - half, 50 + half))
+    assert of("x < 50", "share") == pytest.approx((50 / 101, 0.39947, 0.59093), abs=1e-4)
+    assert of("n / 4", "pooled", by="n")[0] == 0.25
+    # Pairs that always agree say half as much as their members.
+    paired, single = (of("x < 50", "share", by=by) for by in ("group", "x"))
+    assert paired[0] == single[0]
+    assert paired[2] - paired[1] == pytest.approx(2**0.5 * (single[2] - single[1]), rel=0.03)
 
 
 def test_rows_without_a_number_do_not_count():
@@ -209,6 +250,7 @@ def test_every_verdict_can_be_given():
         "reproduced": verdict(),
         "not reproduced": verdict(criterion="fine > 0.5"),
         "reproduced with a condition": verdict(criterion="fine > 0.5", condition=WEAKER),
+        "undecided": verdict(criterion="fine > 0.095"),
         "not testable": verdict(value=None, criterion=None, reason="It is not published."),
     }
     assert list(given) == list(given.values())
@@ -234,7 +276,7 @@ def test_the_condition_is_told():
 
 
 def test_other_numbers_flip_the_verdict():
-    flipped = {"rates": RATES.assign(rate=RATES["rate"] * 2)}
+    flipped = {"rates": RATES.assign(**{name: 2 * RATES[name] for name in ("rate", "low", "high")})}
     assert verdicts.outcome_of(claim(), TABLES).verdict == "reproduced"
     assert verdicts.outcome_of(claim(), flipped).verdict == "not reproduced"
 
@@ -255,6 +297,43 @@ def test_nothing_over_nothing_is_not_testable():
     value = ENTRY["value"] | {"ratio": "(fine - fine) / (coarse - coarse)"}
     judged = verdicts.outcome_of(claim(value=value, criterion="ratio < 1"), TABLES)
     assert (judged.verdict, judged.note) == ("not testable", "Missing: no number: ratio.")
+
+
+def test_an_interval_across_the_line_decides_nothing():
+    judged = verdicts.outcome_of(claim(criterion="fine > 0.095"), TABLES)
+    assert (judged.verdict, judged.by_numbers) == ("undecided", "reproduced")
+    assert judged.note == "By the numbers alone: reproduced." and judged.p == pytest.approx(
+        1 / 3, abs=0.01
+    )
+    # The strongest statement that is decided counts.
+    for line, by_numbers in ((0.095, "reproduced"), (0.105, "reproduced with a condition")):
+        asked = claim(criterion=f"fine > {line}", condition=WEAKER)
+        judged = verdicts.outcome_of(asked, TABLES)
+        assert (judged.verdict, judged.by_numbers) == ("reproduced with a condition", by_numbers)
+        assert judged.note.endswith("Without it the claim is undecided.")
+    # A condition that is undecided does not excuse either.
+    open_condition = WEAKER | {"criterion": "fine < 0.105"}
+    judged = verdicts.outcome_of(claim(criterion="fine > 0.5", condition=open_condition), TABLES)
+    assert judged.verdict == "not reproduced" and "is undecided (it falls at least)" in judged.note
+
+
+def test_claims_without_intervals_are_decided_by_their_numbers():
+    value = {"coarse": ENTRY["value"]["coarse"]}
+    exact = claim(value=value, criterion="coarse > 0.39", uncertainty="exact: a closed form")
+    judged = verdicts.outcome_of(exact, TABLES)
+    assert judged.verdict == "reproduced" and np.isnan(judged.p)
+    (record,) = claims_report.records([judged])
+    assert (record["uncertainty"], record["p"]) == ("exact: a closed form", None)
+
+
+def test_all_claims_at_once_are_decided_after_holm():
+    asked = claims.parse_claims(
+        [entry(id=f"falls-{n}", criterion=f"fine > {0.1 - 0.0001 * n}") for n in (101, 120, 200)]
+    )
+    found = verdicts.outcomes_of(asked, TABLES)
+    assert [each.verdict for each in found] == ["reproduced"] * 3
+    p = [each.p for each in found]
+    assert [each.p_holm for each in found] == pytest.approx([p[0], 2 * p[1], 3 * p[2]])
 
 
 def test_errors_name_the_claim():
@@ -284,6 +363,8 @@ def test_errors_name_the_claim():
         ({"value": {"fine": 3}}, "value fine: give an expression"),
         ({"value": {"max": "1"}}, "'max' cannot be the name"),
         ({"value": {"fine": "later", "later": "1"}}, "value fine uses later"),
+        ({"uncertainty": "exact: a closed form"}, "what decides has intervals"),
+        ({"value": {"fine": "1"}, "criterion": "fine > 0", "uncertainty": "none"}, "'exact: ' or"),
     ],
 )
 def test_a_wrong_claim_is_refused_in_one_line(changes, says):
@@ -304,6 +385,10 @@ def test_a_wrong_claim_is_refused_in_one_line(changes, says):
         ({"where": "rate.max()"}, "is not allowed"),
         ({"low": "low"}, "low and high go together"),
         ({"file": "x"}, "does not know file"),
+        ({"low": "low", "high": "high"}, "mean has no row whose low and high"),
+        ({"take": "max", "low": "open(low)", "high": "high"}, "does not know open"),
+        ({"take": "pooled"}, "by: pooled needs it"),
+        ({"by": "keypoint"}, "by: pooled needs it"),
     ],
 )
 def test_a_wrong_number_is_refused_in_one_line(changes, says):
@@ -359,8 +444,13 @@ def test_every_criterion_can_hold_and_can_fail(listed):
     assert answers.any() and not answers.all()
 
 
+@pytest.mark.parametrize("listed", [each for each in LISTED if each.criterion], ids=lambda listed: listed.id)  # fmt: skip
+def test_what_decides_has_an_interval_or_a_word_why_not(listed):
+    assert bool(listed.uncertainty) is not claims.has_intervals(claims.deciding(listed))
+
+
 def test_claims_are_many_and_of_the_whole_paper():
-    assert len({each.id for each in LISTED}) == len(LISTED) >= 35
+    assert len({each.id for each in LISTED}) == len(LISTED) >= 95
     assert {f"fig{n}" for n in (1, *range(3, 13), "S1", "S2", "S3", "S4", "S5")} <= {
         each.figure for each in LISTED
     }
@@ -382,20 +472,21 @@ def test_the_stage_writes_the_ledger_and_prints_the_tally(tmp_path, capsys):
     arguments += [text for kind, path in out.items() for text in (f"--{kind}", str(path))]
     assert check_claims.main(arguments) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "  2 reproduced", "  0 reproduced with a condition", "  1 not reproduced", "  1 not testable",
+        "  2 reproduced", "  0 reproduced with a condition", "  1 not reproduced", "  0 undecided",
+        "  1 not testable",
     ]  # fmt: skip
 
     records = json.loads(out["json"].read_text())
     assert all(tuple(record) == claims_report.FIELDS for record in records)
     assert records[0]["table"] == ["rates.csv"] and records[0]["verdict"] == "reproduced"
-    assert records[0]["interval"] == {"fine": [0.08, 0.2]}
+    assert records[0]["interval"] == {"fine": [0.09, 0.11], "drop": pytest.approx([0.29, 0.31])}
     assert records[2]["value"] == {"fine": None} and records[3]["value"] == {"fine": "inf"}
 
     with out["csv"].open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == claims_report.FIELDS and len(rows) == 4
     assert rows[0]["value"] == "coarse 0.4; fine 0.1; drop 0.3"
-    assert rows[0]["interval"] == "fine 0.08 to 0.2"
+    assert rows[0]["interval"] == "fine 0.09 to 0.11; drop 0.29 to 0.31"
 
     text = out["markdown"].read_text()
     assert "| reproduced | 2 |" in text and "## Reproduced with a condition" not in text

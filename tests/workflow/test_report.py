@@ -24,6 +24,10 @@ CLAIM = {
     "paper": "small",
     "verdict": "reproduced",
     "note": "",
+    "uncertainty": "interval",
+    "by_numbers": "reproduced",
+    "p": 0.01,
+    "p_holm": 0.01,
 }
 
 

@@ -22,6 +22,7 @@ rule match_views:
         curves=f"{HERE}tables/{{figure}}_curves.csv",
         precision=f"{HERE}tables/{{figure}}_precision.csv",
         counts=f"{HERE}tables/{{figure}}_counts.csv",
+        differences=f"{HERE}tables/{{figure}}_differences.csv",
     log:
         f"{LOG}match_views/{{figure}}.log",
     benchmark:
@@ -51,6 +52,42 @@ rule match_views:
         "{params.command} >{log:q} 2>&1"
 
 
+rule match_translations:
+    """Beside figure 8: stability under translations, in the range of scales that all zooms cover."""
+    input:
+        views=ancient(files("views/{set}", plan.searches, "translations_wide")),
+        views_digest=files("views/{set}.sha256", plan.searches, "translations_wide"),
+        extrema=files(
+            "keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches, "translations_wide"
+        ),
+        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches, "translations_wide"),
+    output:
+        curves=f"{HERE}tables/fig8_translations.csv",
+        counts=f"{HERE}tables/fig8_translations_counts.csv",
+    log:
+        f"{LOG}match_translations.log",
+    benchmark:
+        f"{BENCHMARK}match_translations.tsv"
+    params:
+        **stage(
+            "match_sweep",
+            parameters.ComparedInViews,
+            parameters.Same,
+            "comparison.soft_ends",
+            parameters.Acceptance,
+            "stability.n_resamples",
+            of_set="translations_wide",
+            name="n_spo",
+            values=column("n_spo", plan.searches, "translations_wide"),
+            first_scale=of(plan.scales_of_zooms, 0),
+            last_scale=of(plan.scales_of_zooms, 1),
+        ),
+    message:
+        "Matching the keypoints of translated views at the scales of zooms{params.scene}"
+    shell:
+        "{params.command} >{log:q} 2>&1"
+
+
 rule match_sift:
     """Figure 7: stability of SIFT with its own refinement, with and without its filters."""
     input:
@@ -61,6 +98,7 @@ rule match_sift:
     output:
         curves=f"{HERE}tables/fig7_shipped.csv",
         counts=f"{HERE}tables/fig7_shipped_counts.csv",
+        edges=f"{HERE}tables/fig7_edges.csv",
     log:
         f"{LOG}match_sift.log",
     benchmark:
@@ -72,6 +110,7 @@ rule match_sift:
             parameters.Same,
             "comparison.soft_ends",
             parameters.SiftFilters,
+            "stability.minimum_share",
             "stability.n_resamples",
             of_set="shipped",
         ),

@@ -1,6 +1,6 @@
 """What theory says of blurs, cameras, blobs and noise (sections 2.3, 3.2, 4 and 6.3).
 
-Comes in: settings, and for what the text states of views the picture. Goes out: tables/fig1.csv,
+Comes in: settings, and for what the text states of views the picture. Goes out: tables/fig1*.csv,
 figS3*.csv, figS4.csv and, beside the other tables of figure 12, fig12_theory.csv;
 aliasing_energy.csv, wrong_blur_identity.csv, zoomed_truth.csv and reference_noise.csv. Steps: the semigroup property of discrete blurs; the
 point spread functions of model cameras and the Gaussians nearest to them; Gaussian blobs of many
@@ -21,6 +21,29 @@ rule semigroup:
         **stage("semigroup", parameters.Semigroup),
     message:
         "Blurring a blob of {params.blob} px {params.n_passes} times and once"
+    shell:
+        "{params.command} >{log:q} 2>&1"
+
+
+rule sampling_theory:
+    """Beside figure 1: how much blur samplings add, and whether their steps are balanced."""
+    output:
+        table=f"{RESULTS}/tables/fig1_samplings.csv",
+    log:
+        f"{config['logs']}/sampling_theory.log",
+    benchmark:
+        f"{config['logs']}/benchmarks/sampling_theory.tsv"
+    params:
+        **stage(
+            "sampling_theory",
+            "samplings.n_spo",
+            parameters.Scales,
+            parameters.Semigroup,
+            sift_sigma_min=setting("sets.shipped.sigma_min"),
+            sift_delta_min=setting("sets.shipped.delta_min"),
+        ),
+    message:
+        "Comparing the blurs and the steps of the samplings n_spo = {params.n_spo}"
     shell:
         "{params.command} >{log:q} 2>&1"
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from keystab.errors import InputError
 from keystab.evaluation.intervals import BOTH, Purpose, percentile_interval, table_counts
+from keystab.evaluation.location_errors import quantile
 from keystab.matching.unique_keypoints import gather
 
 
@@ -93,7 +94,8 @@ def mean_localization(
     -------
     DataFrame
         Rows ``location`` (pixels) and ``log2_sigma`` (octaves); columns ``n_keypoints``, ``mean``,
-        ``median``, ``low``, ``high`` (of the mean; NaN without resamples).
+        ``median``, ``low``, ``high`` (of the mean; NaN without resamples), ``low_median``,
+        ``high_median`` (of the median over keypoints, from order statistics).
 
     Notes
     -----
@@ -122,6 +124,10 @@ def mean_localization(
             "median": columns.median().to_numpy(),
             "low": low,
             "high": high,
+            "low_median": [quantile(columns[name], confidence=confidence).low for name in columns],
+            "high_median": [
+                quantile(columns[name], confidence=confidence).high for name in columns
+            ],
         },
         index=pd.Index(["location", "log2_sigma"], name="quantity"),
     )

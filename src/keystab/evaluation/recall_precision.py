@@ -108,7 +108,8 @@ def recall_and_precision(
         precision_low, precision_high`` (Wilson intervals, 95 %); ``n_twin``, second detections of
         a true extremum, which are among the wrong ones; over the found ones the errors
         ``median_location, p90_location`` in pixels and ``median_scale, p90_scale``, of
-        ``|log2(sigma / sigma_true)|`` in octaves. NaN where there are none.
+        ``|log2(sigma / sigma_true)|`` in octaves, and their root mean squares ``rms_location,
+        rms_scale``. NaN where there are none.
     """
     partner, near = _paired(detections, truth, space_tolerance, scale_ratio)
     paired = np.flatnonzero(partner >= 0)
@@ -136,6 +137,9 @@ def recall_and_precision(
             result[f"{name}_{quantity}"] = (
                 float(np.quantile(values, share)) if len(values) else np.nan
             )
+    for quantity, values in away.items():
+        root = float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
+        result[f"rms_{quantity}"] = root
     return result
 
 
@@ -179,7 +183,8 @@ def mean_over_views(
     -------
     dict
         ``n_views``; means over the views of `recall_and_precision`'s numbers, with the intervals of
-        recall and precision from the spread of the views (mean and 1.96 standard errors).
+        recall and precision from the spread of the views (mean and 1.96 standard errors), and
+        those of the root mean square distance, ``low_rms, high_rms``.
     """
     low, high = limits
     wanted = truth["sigma"].between(low, high).to_numpy()
@@ -194,6 +199,11 @@ def mean_over_views(
     for name in ("recall", "precision"):
         error = normal_half_width(each[name])
         result |= {f"{name}_low": result[name] - error, f"{name}_high": result[name] + error}
+    error = normal_half_width(each["rms_location"])
+    result |= {
+        "low_rms": result["rms_location"] - error,
+        "high_rms": result["rms_location"] + error,
+    }
     return result
 
 

@@ -23,9 +23,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.errors import InputError
-from keystab.evaluation.intervals import wilson_interval
+from keystab.evaluation.intervals import normal_half_width, wilson_interval
 from keystab.matching.common_range import CommonRange
 from keystab.matching.correspondence import matched, pairs_between
+
+_DISPLACEMENTS = 16
+"""Directions in which keypoints are moved, a quarter of their field, to see what chance finds."""
 
 
 def errors_by_octave(
@@ -106,7 +109,9 @@ def blur_error_table(
         high_right``; ``scale_shift``, the median of log2(sigma' / sigma) over the pairs of nearest
         same keypoints of either table, with its quartiles ``q25_shift, q75_shift``; and for these
         pairs the medians ``blob_shift``, that the closed form for blobs predicts, and
-        ``dilation_shift``, of a mere dilation; NaN where no such scale exists.
+        ``dilation_shift``, of a mere dilation; NaN where no such scale exists. Last the share
+        ``share_chance`` of the right keypoints that would be found by chance: by the view's if they
+        lay elsewhere, with ``low_chance, high_chance`` (1.96 standard errors over displacements).
     """
     right = keypoints[keypoints["view"] == 0].reset_index(drop=True)
     rows = []
@@ -114,6 +119,7 @@ def blur_error_table(
         view = keypoints[keypoints["view"] == number].reset_index(drop=True)
         found, correct = matched(right, view, **same), matched(view, right, **same)
         shift, sigma = _shifts(right, view, same)
+        chance = [matched(right, elsewhere, **same) for elsewhere in _displaced(view)]
         more = blur**2 - assumed**2
         for name, (low, high) in scales.items():
             inside = right["sigma"].between(low, high).to_numpy()
@@ -132,9 +138,32 @@ def blur_error_table(
                     **dict(zip(("scale_shift", "q25_shift", "q75_shift"), quartiles, strict=True)),
                     "blob_shift": _median_of_closed_form(sigma[pairs], more / kappa),
                     "dilation_shift": _median_of_closed_form(sigma[pairs], -more),
+                    **_chance([of_one[inside] for of_one in chance]),
                 }
             )
     return pd.DataFrame(rows)
+
+
+def _displaced(view: pd.DataFrame) -> list[pd.DataFrame]:
+    """Keypoints at other places with the same scales and neighbours, round the field of all."""
+    if view.empty:
+        return []
+    places = view[["y", "x"]].to_numpy(dtype=float)
+    start, size = places.min(axis=0), np.maximum(np.ptp(places, axis=0), 1e-9)
+    moved = []
+    for turn in np.linspace(0, 2 * np.pi, _DISPLACEMENTS, endpoint=False):
+        away = size * np.array([np.sin(turn), np.cos(turn)]) / 4
+        y, x = (start + (places - start + away) % size).T
+        moved.append(view.assign(y=y, x=x))
+    return moved
+
+
+def _chance(found: Sequence[NDArray[np.bool_]]) -> dict[str, float]:
+    """Mean share that is found over displacements, with its interval."""
+    shares = np.array([each.mean() for each in found if len(each)])
+    mean, half = (shares.mean(), normal_half_width(shares)) if len(shares) else (np.nan, np.nan)
+    ends = {"low_chance": max(0.0, mean - half), "high_chance": min(1.0, mean + half)}
+    return {"share_chance": mean, **(ends if len(shares) else dict.fromkeys(ends, np.nan))}
 
 
 def _share(members: str, kind: str, which: np.ndarray) -> dict[str, float]:

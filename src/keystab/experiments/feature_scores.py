@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.evaluation.roc import auc_table, roc, threshold_curve
+from keystab.evaluation.roc import areas_above, auc_table, roc, threshold_curve
 from keystab.evaluation.stability import keypoint_features, label
 from keystab.prediction.features import DIRECTIONS, feature_table
 
@@ -48,7 +48,9 @@ def score_features(
     Returns
     -------
     Scores
-        A keypoint's feature is the median over its detections.
+        A keypoint's feature is the median over its detections. Areas also say by how much they are
+        ``above_dog``, that of the value of the difference of Gaussians, with ``low_above,
+        high_above``.
     """
     values = feature_table(extrema, extrema["n_spo"], extrema["delta_min"])
     features = keypoint_features(values, found)
@@ -63,7 +65,11 @@ def score_features(
         pd.concat([described, features], axis=1),
         _feature_first(thresholds),
         _feature_first(curves),
-        auc_table(features, names, DIRECTIONS, ("figure 5",), n_resamples),
+        auc_table(features, names, DIRECTIONS, ("figure 5",), n_resamples).join(
+            areas_above(features, names, DIRECTIONS, "dog", ("figure 5",), n_resamples).rename(
+                columns={"above": "above_dog"}
+            )
+        ),
     )
 
 

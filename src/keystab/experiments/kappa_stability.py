@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from keystab.evaluation.scene_pieces import ratio_intervals
 from keystab.matching.common_range import comparable
-from keystab.matching.unique_keypoints import matches, unique_keypoints
+from keystab.matching.unique_keypoints import gather, matches, unique_keypoints
 from keystab.scalespace.sampling import balanced_delta
 
 
@@ -37,6 +39,38 @@ def common_normalised_scales(kappas: Sequence[float], sigma_min: float) -> tuple
     (1.4142135623730951, 2.0)
     """
     return sigma_min * max(kappas) ** 0.5, 2 * sigma_min * min(kappas) ** 0.5
+
+
+def scale_slopes(normalised: NDArray[np.float64], kappas: Sequence[float]) -> NDArray[np.float64]:
+    r"""Exponent of kappa to which the scale of each keypoint goes: -1/2 for a blob.
+
+    Parameters
+    ----------
+    normalised : ndarray, shape (n_keypoints, n_kappas)
+        Scales :math:`\sigma\sqrt\kappa`; NaN where a keypoint is not found.
+    kappas : sequence of float
+
+    Returns
+    -------
+    ndarray, shape (n_keypoints,)
+        Slope of :math:`\ln\sigma` against :math:`\ln\kappa` in least squares; NaN for keypoints
+        that are found with less than half of the ratios or with fewer than three.
+
+    Examples
+    --------
+    >>> kappas = [1.1, 1.2, 1.3, 1.4]
+    >>> blob = [1.5] * 4
+    >>> (1 + scale_slopes(np.array([blob, np.sqrt(kappas)]), kappas)).round(6).tolist()
+    [0.5, 1.0]
+    """
+    seen = np.isfinite(normalised)
+    n_seen = seen.sum(axis=1)
+    enough = n_seen >= max(3, len(kappas) / 2)
+    x, y = (np.where(seen, np.log(np.broadcast_to(v, seen.shape)), 0) for v in (kappas, normalised))
+    x, y = (np.where(seen, v - (v.sum(axis=1) / np.maximum(n_seen, 1))[:, None], 0) for v in (x, y))
+    power = (x * x).sum(axis=1)
+    slope = (x * y).sum(axis=1) / np.where(power > 0, power, np.nan)
+    return np.where(enough, slope - 0.5, np.nan)
 
 
 def kappa_tables(
@@ -72,8 +106,11 @@ def kappa_tables(
     -------
     KappaTables
         ``counts``: ``kappa, delta_min``, ``n_octave`` (keypoints with sigma in [sigma_min,
-        2 sigma_min]), ``n_common`` (in the common range of normalised scales and off the border).
-        ``keypoints``: ``keypoint, y, x, sigma`` (normalised), ``n_kappas, stability``.
+        2 sigma_min]), ``n_common`` (in the common range of normalised scales and off the border);
+        ``octave_ratio, common_ratio``, the same over their means, with 95 % intervals over pieces
+        of the scene ``low_octave, high_octave, low_common, high_common``.
+        ``keypoints``: ``keypoint, y, x, sigma`` (normalised), ``n_kappas, stability, scale_slope``,
+        see `scale_slopes`.
         ``occurrence``: ``keypoint, kappa, detected`` (0 or 1).
 
     Notes
@@ -90,17 +127,23 @@ def kappa_tables(
     unique = unique_keypoints(common, **same, set_column="kappa")
     counterparts = common
     if soft_ends:
-        counterparts = normalised[comparable(normalised, shape, 0.0, 1.0, border, "sigma")]
-    found = matches(unique, counterparts, **same, set_column="kappa", sets=kappas) >= 0
+        near = comparable(normalised, shape, 0.0, 1.0, border, "sigma")
+        counterparts = normalised[near].reset_index(drop=True)
+    rows = matches(unique, counterparts, **same, set_column="kappa", sets=kappas)
+    found = rows >= 0
     counts = pd.DataFrame({"kappa": kappas})
     counts["delta_min"] = [balanced_delta(n_spo, kappa, sigma_min) for kappa in kappas]
     for name, members in (("n_octave", table[octave]), ("n_common", common)):
         number = members["kappa"].value_counts()
         counts[name] = [int(number.get(kappa, 0)) for kappa in kappas]
+    for kind, members in (("octave", table[octave]), ("common", common)):
+        places = [members.loc[members["kappa"] == kappa, ["y", "x"]] for kappa in kappas]
+        counts = counts.join(ratio_intervals(places, None, f"{kind}_ratio", kind, "kappas"))
     described = unique[["y", "x", "sigma"]].reset_index(drop=True)
     described.insert(0, "keypoint", np.arange(len(unique)))
     described["n_kappas"] = found.sum(axis=1)
     described["stability"] = described["n_kappas"] / len(kappas)
+    described["scale_slope"] = scale_slopes(gather(counterparts["sigma"], rows), kappas)
     occurrence = pd.DataFrame(
         {
             "keypoint": np.repeat(np.arange(len(unique)), len(kappas)),

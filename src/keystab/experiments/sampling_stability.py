@@ -14,7 +14,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.evaluation.intervals import wilson_interval
+from keystab.evaluation.intervals import percentile_interval, wilson_interval
+from keystab.evaluation.location_errors import quantile
+from keystab.evaluation.scene_pieces import count_ratios
 from keystab.evaluation.stability import new_and_lost
 from keystab.matching.common_range import compared
 from keystab.matching.unique_keypoints import matches, minimum_unique_set
@@ -24,8 +26,82 @@ Same = Mapping[str, Any]
 """What `keystab.matching.correspondence.same` takes besides two tables, by name."""
 
 
+class Counted(NamedTuple):
+    """What was counted at one sampling, and where it lies.
+
+    Attributes
+    ----------
+    numbers : dict
+        See `sampling_counts`.
+    extrema, common, unique : DataFrame
+        All extrema, the comparable ones, and their unique set, with ``y, x`` in pixels.
+    """
+
+    numbers: dict[str, Any]
+    extrema: pd.DataFrame
+    common: pd.DataFrame
+    unique: pd.DataFrame
+
+
+SIFT = (3, 0.5)
+"""SIFT's default sampling (section 2.2): n_spo and delta_min in pixels."""
+
+
+def ratio_columns(counted: Sequence[Counted]) -> pd.DataFrame:
+    """Numbers of all samplings over those of SIFT's, with intervals over pieces of the scene.
+
+    Parameters
+    ----------
+    counted : sequence of Counted
+        Their numbers also say ``n_spo, delta_min, balanced``.
+
+    Returns
+    -------
+    DataFrame
+        In their order: ``extrema_ratio, common_ratio, unique_ratio`` with ``low_extrema,
+        high_extrema`` and so on; ``ratio_drop``, by how much the ratio of unique ones is lower than
+        that of all comparable ones, with ``low_drop, high_drop``; ``share_duplicates`` of the
+        comparable ones with its Wilson interval ``low_duplicates, high_duplicates``; and
+        ``low_condition, high_condition``, the interval of the median condition number from order
+        statistics. All 95 %; ratios are NaN without SIFT's sampling.
+    """
+    named = [
+        (one.numbers["n_spo"], one.numbers["delta_min"], one.numbers["balanced"]) for one in counted
+    ]
+    default = named.index((*SIFT, False)) if (*SIFT, False) in named else None
+    parts: dict[str, Any] = {}
+    drawn: dict[str, NDArray[np.float64]] = {}
+    for kind in ("extrema", "common", "unique"):
+        tables = [getattr(one, kind)[["y", "x"]] for one in counted]
+        ratios, samples = count_ratios(tables, default, purpose=("samplings",))
+        drawn[kind] = np.vstack([ratios, samples]) * (1.0 if default is not None else np.nan)
+    drawn["drop"] = drawn["common"] - drawn["unique"]
+    for kind, values in drawn.items():
+        low, high = percentile_interval(values[1:])
+        name = "ratio_drop" if kind == "drop" else f"{kind}_ratio"
+        parts |= {name: values[0], f"low_{kind}": low, f"high_{kind}": high}
+    n_common = np.array([len(one.common) for one in counted])
+    n_duplicates = n_common - [len(one.unique) for one in counted]
+    low, high = wilson_interval(n_duplicates, n_common)
+    share = n_duplicates / np.where(n_common > 0, n_common, np.nan)
+    parts |= {"share_duplicates": share, "low_duplicates": low, "high_duplicates": high}
+    medians = [quantile(condition_numbers(hessians(one.extrema))) for one in counted]
+    parts |= {
+        f"{end}_condition": [getattr(each, end) for each in medians] for end in ("low", "high")
+    }
+    return pd.DataFrame(parts)
+
+
 def sampling_counts(extrema: pd.DataFrame, common: pd.DataFrame, same: Same) -> dict[str, Any]:
     """Numbers of extrema of one sampling, and the condition of their Hessians (figure 3).
+
+    See `count_sampling`, which also says where they lie.
+    """
+    return count_sampling(extrema, common, same).numbers
+
+
+def count_sampling(extrema: pd.DataFrame, common: pd.DataFrame, same: Same) -> Counted:
+    """Count the extrema of one sampling, and see how well their Hessians are conditioned (fig. 3).
 
     Parameters
     ----------
@@ -38,21 +114,23 @@ def sampling_counts(extrema: pd.DataFrame, common: pd.DataFrame, same: Same) -> 
 
     Returns
     -------
-    dict
-        ``n_extrema``, ``n_common``, ``n_unique``, ``gap`` (0: the unique set is proven minimal) and
-        the quartiles ``median_condition``, ``q25_condition``, ``q75_condition`` of the condition
-        number of the Hessian per grid step over all extrema; NaN where there are none.
+    Counted
+        Its numbers are ``n_extrema``, ``n_common``, ``n_unique``, ``gap`` (0: the unique set is
+        proven minimal) and the quartiles ``median_condition``, ``q25_condition``,
+        ``q75_condition`` of the condition number of the Hessian per grid step over all extrema; NaN
+        where there are none.
     """
     unique = minimum_unique_set(common, **same, set_column=None)
     condition = condition_numbers(hessians(extrema))
     quartiles = np.quantile(condition, [0.5, 0.25, 0.75]) if len(condition) else [np.nan] * 3
-    return {
+    numbers = {
         "n_extrema": len(extrema),
         "n_common": len(common),
         "n_unique": len(unique.keypoints),
         "gap": unique.gap,
         **dict(zip(("median_condition", "q25_condition", "q75_condition"), quartiles, strict=True)),
     }
+    return Counted(numbers, extrema, common, unique.keypoints)
 
 
 def change_counts(
@@ -123,7 +201,8 @@ class Matched(NamedTuple):
     Attributes
     ----------
     keypoints : DataFrame
-        ``keypoint, y, x, sigma, sign, n_samplings, stability``.
+        ``keypoint, y, x, sigma, sign, n_samplings, stability``, and ``n_changes``: how often a
+        keypoint comes or goes from one sampling to the next.
     found : ndarray of int, shape (n_keypoints, n_samplings)
         Row positions in the table of comparable detections, -1 where there is none.
     gap : int
@@ -159,6 +238,7 @@ def keypoints_of_samplings(
     keypoints.insert(0, "keypoint", np.arange(len(keypoints)))
     keypoints["n_samplings"] = (found >= 0).sum(axis=1)
     keypoints["stability"] = keypoints["n_samplings"] / len(samplings)
+    keypoints["n_changes"] = (np.diff(found >= 0, axis=1)).sum(axis=1)
     return Matched(keypoints, found, unique.gap)
 
 

@@ -14,8 +14,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from keystab.evaluation.intervals import BOTH, Purpose, normal_half_width, wilson_interval
+from keystab.evaluation.intervals import (
+    BOTH,
+    Purpose,
+    centred_interval,
+    normal_half_width,
+    wilson_interval,
+)
 from keystab.evaluation.localization import mean_localization
+from keystab.evaluation.scene_pieces import drawn_anew
 from keystab.evaluation.stability import stability_curve
 from keystab.matching.common_range import CommonRange, compared
 from keystab.matching.correspondence import SPACE_TOLERANCE
@@ -217,7 +224,9 @@ def scale_table(
         ``n_seen`` of
         them, in at least ``seen_by`` of the views; ``percentage_seen`` with ``low, high``;
         ``mean_above``, keypoints per view at scales of at least ``sigma_from`` and without upper
-        end, with ``low_above, high_above`` (1.96 standard errors over views).
+        end, with ``low_above, high_above`` (1.96 standard errors over views); ``step``, by how much
+        ``percentage_seen`` is larger than at the start before, with ``low_step, high_step``: the
+        octaves overlap, and both are drawn anew with the same pieces of the scene and views.
     """
     rows = []
     n_views = len(everywhere.specs)
@@ -225,6 +234,9 @@ def scale_table(
     kinds = [("view", [limit] * len(starts))]
     if unit:
         kinds.append(("octave", [limit * start / unit for start in starts]))
+    octaves: dict[str, list[tuple[pd.DataFrame, NDArray[np.intp]]]] = {
+        kind: [] for kind, _ in kinds
+    }
     for kind, start, tolerance in (
         (kind, *pair) for kind, limits in kinds for pair in zip(starts, limits, strict=True)
     ):
@@ -232,6 +244,7 @@ def scale_table(
         octave = CommonRange(*field, start, 2 * start, everywhere.soft)
         how = {**same, "space_tolerance": tolerance}
         matched = keypoints_of_views(octave.common(detections), n_views, how)
+        octaves[kind].append((matched.common, matched.found))
         curve = stability_curve(
             matched.seen,
             [100 * seen_by],
@@ -256,7 +269,24 @@ def scale_table(
                 "high_above": per_view.mean() + error,
             }
         )
-    return labelled(pd.DataFrame(rows), labels)
+    steps = [_steps(found, seen_by, n_resamples) for found in octaves.values()]
+    return labelled(pd.DataFrame(rows).join(pd.concat(steps, ignore_index=True)), labels)
+
+
+def _steps(
+    octaves: Sequence[tuple[pd.DataFrame, NDArray[np.intp]]], seen_by: float, n_resamples: int
+) -> pd.DataFrame:
+    """Steps of the percentage of keypoints seen often enough, from one octave to the next."""
+    shares = [
+        100 * drawn.share(int(np.ceil(seen_by * drawn.n_views - 1e-9)))
+        for drawn in drawn_anew(octaves, n_resamples)
+    ]
+    steps = np.diff(np.array(shares), axis=0, prepend=np.nan)
+    columns = {"step": steps[:, 0], "low_step": np.nan, "high_step": np.nan}
+    if n_resamples and len(octaves) > 1:
+        low, high = centred_interval(steps[1:, 1:].T, steps[1:, 0])
+        columns["low_step"], columns["high_step"] = np.append(np.nan, low), np.append(np.nan, high)
+    return pd.DataFrame(columns)
 
 
 def purpose_of(labels: Labels) -> Purpose:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 SHARES = ("recall", "recall_low", "recall_high", "precision", "precision_low", "precision_high")
-ERRORS = ("median_location", "p90_location", "median_scale", "p90_scale")
+ERRORS = ("median_location", "p90_location", "rms_location", "median_scale", "p90_scale")
 
 TABLES = {
     "truth_samplings.csv": (
@@ -149,10 +149,11 @@ def _draw_share(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> No
 
 
 def _draw_errors(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> None:
-    """Draw the median and the 90th percentile of an error against the sampling."""
+    """Draw quantiles of an error, and the root mean square in space, against the sampling."""
+    lines = [("median", "-"), ("p90", ":"), *([("rms", "-.")] if name == "location" else [])]
     for detections, colour in palette.DETECTION_COLOURS.items():
         rows, other = _of(spline, detections), _of(cosine, detections)
-        for quantile, line in (("median", "-"), ("p90", ":")):
+        for quantile, line in lines:
             column = f"{quantile}_{name}"
             ax.plot(rows["n_spo"], rows[column], line, color=colour, linewidth=1.2,
                     label=f"{detections}, {quantile}")  # fmt: skip
@@ -160,12 +161,14 @@ def _draw_errors(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> N
             other["n_spo"], other[f"median_{name}"], "o", color=colour, markerfacecolor="none",
             markersize=4.0, label=f"{detections}, cosine",
         )  # fmt: skip
-    drawn = [spline[f"{q}_{name}"] for q in ("median", "p90")]
+    drawn = [spline[f"{quantile}_{name}"] for quantile, _ in lines]
     values = np.concatenate([*drawn, cosine[f"median_{name}"]])
     values = values[values > 0]
-    style.log_y_axis(ax, 0.6 * values.min(), 2.5 * values.max())
+    room = 5.0 if name == "location" else 2.5  # for what the lines mean
+    style.log_y_axis(ax, 0.6 * values.min(), room * values.max())
     if name == "location":
-        _list(ax, [("solid: median, dotted: 90 %", palette.GREY)], top=True)
+        words = ("solid: median, dotted: 90 %", "dash-dotted: r.m.s.")
+        _list(ax, [(each, palette.GREY) for each in words], top=True)
     style.sampling_axis(ax, spline["n_spo"])
     style.finish_axes(ax)
 

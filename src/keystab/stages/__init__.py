@@ -65,6 +65,8 @@ Comparison
     minimum_share : least share of the views that see a keypoint whose precision counts
     curves : table of curves of stability
     precision : table of precisions
+    differences : table of what two choices of keypoints differ by
+    edges : table of spreads along edges and across
     scales : table of counts against scale
     soft_ends : whether counterparts may lie beyond the ends of the range of scales
     border : pixels left out at the border of the view
@@ -107,6 +109,8 @@ Audits
     audits_by_phase : tables of errors against the sub-pixel phase
 
 Theory
+    sift_sigma_min : first scale of SIFT as shipped, pixels
+    sift_delta_min : sampling step of SIFT as shipped, pixels
     profiles : table of profiles of point spread functions
     camera_blur : camera blur, pixels
     ranges : table of the camera blurs between which cameras in focus lie

@@ -25,7 +25,7 @@ def main(
 
     import pandas as pd
 
-    from keystab.experiments.sampling_stability import sampling_counts
+    from keystab.experiments.sampling_stability import count_sampling, ratio_columns
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling
@@ -41,12 +41,14 @@ def main(
         for n, step in product(n_spo, delta_min)
     ]
     every += [(balanced, True, Sampling.balanced(*seen, n, **vars(scales))) for n in balanced_n_spo]
-    rows = []
+    counted = []
     for found, is_balanced, sampling in every:
         here = {"n_spo": sampling.n_spo, "delta_min": sampling.delta_min}
         extrema = found[
             (found["n_spo"] == sampling.n_spo) & (found["delta_min"] == sampling.delta_min)
         ]
-        counts = sampling_counts(extrema, extrema[common(extrema, "step_sigma")], vars(same))
-        rows.append({**here, "balanced": is_balanced, "n_samples": sampling.n_samples, **counts})
-    write_table(pd.DataFrame(rows), table)
+        one = count_sampling(extrema, extrema[common(extrema, "step_sigma")], vars(same))
+        here |= {"balanced": is_balanced, "n_samples": sampling.n_samples}
+        counted.append(one._replace(numbers=here | one.numbers))
+    numbers = pd.DataFrame([one.numbers for one in counted])
+    write_table(numbers.join(ratio_columns(counted)), table)

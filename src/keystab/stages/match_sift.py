@@ -14,15 +14,18 @@ def main(
     compared: ComparedInViews,
     same: Same,
     sift: SiftFilters,
+    minimum_share: float,
     n_resamples: int,
     soft_ends: bool = False,
     *,
     curves: Path,
     counts: Path,
+    edges: Path,
 ) -> None:
-    """Read extrema and traces of a set; write curves and counts, filtered and not."""
+    """Read extrema and traces of a set; write curves, counts and spreads."""
     from keystab.detection.refinement import refined_keypoints
     from keystab.detection.sift_filters import passes_filters
+    from keystab.experiments.filtered_keypoints import edge_spreads, kept_by_filters
     from keystab.experiments.view_stability import count_table, curve_table, keypoints_of_views
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_views
@@ -40,5 +43,7 @@ def main(
         matched = keypoints_of_views(everywhere.common(keypoints), len(seen), vars(same))
         curve_tables.append(curve_table(matched, {"shipped": name}, n_resamples))
         count_tables.append(count_table(matched, {"shipped": name}))
+        if name == "unfiltered":
+            write_joined([edge_spreads(matched, sift.edge_ratio, minimum_share)], edges)
     write_joined(curve_tables, curves)
-    print(write_joined(count_tables, counts).to_string(index=False))
+    print(write_joined([kept_by_filters(count_tables)], counts).to_string(index=False))

@@ -27,9 +27,11 @@ def main(
     curves: Path,
     precision: Path,
     counts: Path,
+    differences: Path,
 ) -> None:
-    """Read extrema and traces of a set at several samplings; write curves, precision and counts."""
+    """Read extrema and traces of a set at several samplings; write curves, precision, counts."""
     from keystab.evaluation.intervals import BOTH
+    from keystab.experiments import view_differences as differing
     from keystab.experiments.refinement_limits import choices
     from keystab.experiments.view_stability import (
         count_table,
@@ -49,7 +51,7 @@ def main(
     drawn = ("keypoints",) if tilts else BOTH
     usual = (accepted.max_offset, accepted.max_iterations)
     further = [(m, n) for n in iterations for m in max_offsets]
-    curve_tables, precision_tables, count_tables = [], [], []
+    curve_tables, precision_tables, count_tables, curved = [], [], [], []
     for n, extrema_path, traces_path in zip(n_spo, extrema, traces, strict=True):
         discrete, models = read_table(extrema_path), read_table(traces_path)
         limits = [usual, *further] if n in curve_n_spo else [usual]
@@ -62,10 +64,13 @@ def main(
                 count_tables.append(count_table(matched, own))
                 if n in curve_n_spo:
                     curve_tables.append(curve_table(matched, own, n_resamples))
+                    curved.append(differing.Choice(own, matched))
                 if choice.limits in (None, usual):
                     precision_tables.append(
                         localization_table(matched, own, minimum_share, n_resamples, drawn)
                     )
     write_joined(curve_tables, curves)
     write_joined(precision_tables, precision)
+    pairs = differing.pairs_of_choices(curved, usual)
+    write_joined([differing.difference_table(pairs, n_resamples)], differences)
     print(write_joined(count_tables, counts).to_string(index=False))

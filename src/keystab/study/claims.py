@@ -16,7 +16,15 @@ from keystab.errors import InputError
 from keystab.study.expressions import CALLS, CONSTANTS, names_of
 from keystab.study.plain_yaml import read_plain_yaml
 
-__all__ = ["Claim", "Quantity", "parse_claims", "read_claims", "table_names"]
+__all__ = [
+    "Claim",
+    "Quantity",
+    "deciding",
+    "has_intervals",
+    "parse_claims",
+    "read_claims",
+    "table_names",
+]
 
 
 class Quantity(NamedTuple):
@@ -37,7 +45,9 @@ class Quantity(NamedTuple):
     take : str
         How many numbers become one, see `keystab.study.verdicts.measured`.
     low, high : str
-        Columns with the ends of the interval of `column`; empty where there are none.
+        Expressions over columns: the ends of the interval of `column`; empty where there are none.
+    by : str
+        Column of what rows of a share belong to, or of what they are counted of.
     """
 
     name: str
@@ -48,13 +58,15 @@ class Quantity(NamedTuple):
     take: str = ""
     low: str = ""
     high: str = ""
+    by: str = ""
 
 
 class Claim(NamedTuple):
     """A statement of the paper and how it is tested.
 
     `criterion` is empty for what cannot be tested; `note` then says why. `condition` is a weaker
-    criterion, and `condition_words` says what it asks.
+    criterion, and `condition_words` says what it asks. `uncertainty` says why no number that
+    decides has an interval, where none has: "exact" or "descriptive", and a reason.
     """
 
     id: str
@@ -67,6 +79,7 @@ class Claim(NamedTuple):
     condition: str = ""
     condition_words: str = ""
     note: str = ""
+    uncertainty: str = ""
 
     @property
     def tables(self) -> tuple[str, ...]:
@@ -74,12 +87,14 @@ class Claim(NamedTuple):
         return tuple(dict.fromkeys(name for part in self.quantities for name in part.tables))
 
 
-_TAKES = ("one", "mean", "median", "min", "max", "sum", "share")
+_TAKES_OF_SAMPLES = ("share", "pooled", "sample_mean", "sample_median")
+_TAKES = ("one", "mean", "median", "min", "max", "sum", *_TAKES_OF_SAMPLES)
 _TAKES_ALONG = ("first", "last", "argmax", "argmin", "largest_step", "smallest_step")
 
 _TEXTS = ("id", "where", "statement", "paper")
 _KNOWN = {*_TEXTS, "figure", "value", "criterion", "condition", "note", "reason"}
-_KNOWN_OF_QUANTITY = {"table", "where", "column", "take", "low", "high"}
+_KNOWN |= {"uncertainty"}
+_KNOWN_OF_QUANTITY = {"table", "where", "column", "take", "low", "high", "by"}
 
 
 def read_claims(path: str | os.PathLike[str]) -> list[Claim]:
@@ -143,7 +158,7 @@ def _claim(entry: Any) -> Claim:
     if ("criterion" in entry) == ("reason" in entry):
         raise InputError("give either a criterion, or a reason why there is none")
     if "reason" in entry:
-        extra = sorted({"value", "condition", "note"} & set(entry))
+        extra = sorted({"value", "condition", "note", "uncertainty"} & set(entry))
         if extra:
             raise InputError(f"has a reason why it is not tested, and so needs no {extra[0]}")
         return claim._replace(note=_text(entry, "reason"))
@@ -153,7 +168,9 @@ def _claim(entry: Any) -> Claim:
         quantities=quantities,
         criterion=_over(names, _text(entry, "criterion"), "criterion"),
         note=_text(entry, "note", needed=False),
+        uncertainty=_text(entry, "uncertainty", needed=False),
     )
+    _check_uncertainty(claim)
     if "condition" not in entry:
         return claim
     condition = entry["condition"]
@@ -164,6 +181,40 @@ def _claim(entry: Any) -> Claim:
         condition=_over(names, _text(condition, "criterion"), "condition"),
         condition_words=_text(condition, "words"),
     )
+
+
+def _check_uncertainty(claim: Claim) -> None:
+    """Refuse words about why nothing has an interval that are not needed, or say nothing."""
+    if claim.uncertainty and has_intervals(deciding(claim)):
+        raise InputError("uncertainty: what decides has intervals; leave it out")
+    if claim.uncertainty and not re.match(r"(exact|descriptive): \S", claim.uncertainty):
+        raise InputError("uncertainty: write 'exact: ' or 'descriptive: ' and why, nothing else")
+
+
+def deciding(claim: Claim) -> list[Quantity]:
+    """Numbers taken from tables that the criterion of a claim goes back to.
+
+    Examples
+    --------
+    >>> parts = (Quantity("a", take="one"), Quantity("b", take="one"), Quantity("c", "2 * a"))
+    >>> [part.name for part in deciding(Claim("", "", "", "", "", parts, "c > 1"))]
+    ['a']
+    """
+    parts = {part.name: part for part in claim.quantities}
+    found: dict[str, Quantity] = {}
+    wanted = sorted(names_of(claim.criterion)) if claim.criterion else []
+    while wanted:
+        part = parts[wanted.pop(0)]
+        if part.expression:
+            wanted += sorted(names_of(part.expression))
+        else:
+            found[part.name] = part
+    return list(found.values())
+
+
+def has_intervals(quantities: Iterable[Quantity]) -> bool:
+    """Whether any of some numbers is taken with an interval."""
+    return any(part.low or part.take in _TAKES_OF_SAMPLES for part in quantities)
 
 
 def _quantities(value: Any) -> tuple[Quantity, ...]:
@@ -205,12 +256,14 @@ def _taken(name: str, given: Mapping[str, Any]) -> Quantity:
             take=fields.get("take", ""),
             low=fields.get("low", ""),
             high=fields.get("high", ""),
+            by=fields.get("by", ""),
         )
         for needed in ("column", "take"):
             if needed not in given:
                 raise InputError(f"lacks {needed}")
-        for expression in filter(None, (quantity.rows, quantity.column)):
-            names_of(expression)
+        for expression in (quantity.rows, quantity.column, quantity.low, quantity.high):
+            if expression:
+                names_of(expression)
         how, *along = quantity.take.split()
         if not ((how in _TAKES and not along) or (how in _TAKES_ALONG and len(along) == 1)):
             alone = ", ".join(_TAKES)
@@ -220,6 +273,10 @@ def _taken(name: str, given: Mapping[str, Any]) -> Quantity:
             )
         if bool(quantity.low) != bool(quantity.high):
             raise InputError("low and high go together: give both or neither")
+        if quantity.low and how in ("mean", "median", "sum", *_TAKES_OF_SAMPLES):
+            raise InputError(f"take: {how} has no row whose low and high could be taken")
+        if (how == "pooled") > bool(quantity.by) or quantity.by and how not in ("share", "pooled"):
+            raise InputError("by: pooled needs it, share may have it, other takes have none")
     except InputError as error:
         raise InputError(f"value {name}: {error}") from None
     return quantity

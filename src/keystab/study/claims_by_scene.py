@@ -15,7 +15,7 @@ from keystab.errors import InputError
 from keystab.study import settings
 from keystab.study.claims_report import FIELDS, cell
 from keystab.study.result_folders import normal_folder
-from keystab.study.verdicts import UNTESTED, VERDICTS
+from keystab.study.verdicts import UNDECIDED, UNTESTED, VERDICTS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,9 +138,9 @@ def side_by_side(reports: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``id, where, statement, paper, criterion``; ``depends``, yes where verdicts differ and
-        else no; and ``NAME_verdict, NAME_value, NAME_interval`` for every picture NAME. Claims
-        are in the order of the first report.
+        ``id, where, statement, paper, criterion``; ``depends``, yes where verdicts that are
+        decided differ and else no; and ``NAME_verdict, NAME_value, NAME_interval`` for every
+        picture NAME. Claims are in the order of the first report.
 
     Raises
     ------
@@ -180,7 +180,8 @@ def side_by_side(reports: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
             )
     verdicts = pd.DataFrame({name: report["verdict"] for name, report in ordered.items()})
     table = ordered[first].reset_index()
-    table["depends"] = ["yes" if n > 1 else "no" for n in verdicts.nunique(axis=1)]
+    decided = verdicts.where(verdicts != UNDECIDED).nunique(axis=1)
+    table["depends"] = ["yes" if n > 1 else "no" for n in decided]
     of_pictures = {
         f"{name}_{what}": report[what].to_numpy()
         for name, report in ordered.items()
@@ -207,7 +208,8 @@ def to_markdown(table: pd.DataFrame) -> str:
         "",
         "Every claim of the paper, with the same criterion for every picture; the `claims.md` of",
         "each picture explains the verdicts, and `claims_pictures.csv` holds the same as below.",
-        "Where the intervals of two pictures overlap, one scene could have given either verdict.",
+        "A verdict depends on the picture where two pictures decide it differently; one that is",
+        "undecided for a picture contradicts none.",
         "",
         f"{depends.sum()} of {len(tested)} verdicts depend on the picture.",
         "",

@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from keystab.study.decisions import LEVEL
 from keystab.study.verdicts import UNTESTED, VERDICTS, Outcome, tally
 from keystab.utils.files import written_whole
 
@@ -20,6 +21,7 @@ __all__ = ["FIELDS", "cell", "records", "to_json", "to_markdown", "to_table", "w
 FIELDS = (
     *("id", "where", "statement", "figure", "table", "criterion"),
     *("value", "interval", "paper", "verdict", "note"),
+    *("uncertainty", "by_numbers", "p", "p_holm"),
 )
 
 
@@ -27,6 +29,9 @@ def records(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
     """One record per claim with `FIELDS`; numbers that do not exist are None, infinity is "inf".
 
     ``value`` maps names to numbers, ``interval`` names to pairs of ends, where there are any.
+    ``uncertainty`` is "interval", or says why there is none; ``by_numbers`` is the verdict that the
+    numbers would give if they were exact; ``p`` and ``p_holm`` are the levels at which the verdict
+    is decided, by itself and with all others.
     """
     return [
         {
@@ -45,9 +50,18 @@ def records(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
             "paper": each.claim.paper,
             "verdict": each.verdict,
             "note": each.note,
+            "uncertainty": _uncertainty(each),
+            "by_numbers": each.by_numbers,
+            "p": _plain(each.p),
+            "p_holm": _plain(each.p_holm),
         }
         for each in outcomes
     ]
+
+
+def _uncertainty(each: Outcome) -> str:
+    """What is known of how far the numbers that decide could be off."""
+    return each.claim.uncertainty if math.isnan(each.p) else "interval"
 
 
 def _plain(value: float) -> float | str | None:
@@ -75,6 +89,7 @@ def to_table(outcomes: Iterable[Outcome]) -> pd.DataFrame:
                 f"{name} {_short(low)} to {_short(high)}"
                 for name, (low, high) in record["interval"].items()
             ),
+            **{name: _level(record[name]) for name in ("p", "p_holm")},
         }
         for record in records(outcomes)
     ]
@@ -83,6 +98,19 @@ def to_table(outcomes: Iterable[Outcome]) -> pd.DataFrame:
 
 def _numbers(values: Mapping[str, float | str | None]) -> str:
     return "; ".join(f"{name} {_short(value)}" for name, value in values.items())
+
+
+def _level(p: float | None) -> str:
+    """Write a level for people: two digits, small ones as a bound, none where there is none.
+
+    Examples
+    --------
+    >>> _level(0.0312), _level(1e-9), _level(None)
+    ('0.031', '<0.001', '')
+    """
+    if p is None:
+        return ""
+    return "<0.001" if p < 1e-3 else f"{p:.2g}"
 
 
 def _short(value: float | str | None) -> str:
@@ -110,6 +138,12 @@ def to_markdown(outcomes: Sequence[Outcome]) -> str:
         "Every claim was given a criterion from the paper's words. `claims.csv` and `claims.json`",
         "hold the same with all criteria; `config/claims.yaml` says how each number is computed.",
         "",
+        f"A criterion is decided at p <= {LEVEL:g}, where the 95 % interval of its margin keeps",
+        "off its line; else the claim is undecided. `p` is that of the claim by itself, and after",
+        "it that of all claims at once (Holm): where that is above the level, a verdict is",
+        "descriptive.",
+        *_of_all(outcomes),
+        "",
         "| verdict | claims |",
         "|---|---|",
         *(f"| {verdict} | {number} |" for verdict, number in counts.items()),
@@ -123,16 +157,27 @@ def to_markdown(outcomes: Sequence[Outcome]) -> str:
             lines += ["| claim | where | the paper says | why |", "|---|---|---|---|"]
         else:
             lines += [
-                "| claim | where | the paper says | its number or word | criterion | found | |",
-                "|---|---|---|---|---|---|---|",
+                "| claim | where | the paper says | its number or word | criterion | found | p | |",
+                "|---|---|---|---|---|---|---|---|",
             ]
         for row in table[table["verdict"] == verdict].to_dict("records"):
             cells = [f"`{row['id']}`", _place(row), row["statement"]]
             if verdict != UNTESTED:
                 found = row["value"] + (f" ({row['interval']})" if row["interval"] else "")
                 cells += [row["paper"], f"`{row['criterion']}`", found]
+                cells += [f"{row['p']}, {row['p_holm']}" if row["p"] else row["uncertainty"]]
             lines.append("| " + " | ".join(cell(text) for text in (*cells, row["note"])) + " |")
     return "\n".join(lines) + "\n"
+
+
+def _of_all(outcomes: Sequence[Outcome]) -> list[str]:
+    """Say how many verdicts are decided by intervals, and how many for all claims at once."""
+    levels = [(each.p, each.p_holm) for each in outcomes if not math.isnan(each.p)]
+    alone, together = (sum(pair[i] <= LEVEL for pair in levels) for i in (0, 1))
+    return [
+        f"Of {len(levels)} claims with intervals {alone} are decided by themselves and {together} "
+        "with all others."
+    ]
 
 
 def _place(row: Mapping[Any, Any]) -> str:

@@ -53,7 +53,7 @@ _PRECISION = Proportion("precision", "n_right", "n_detections", "precision_low",
 
 RELATIONS: dict[str, list[Proportion | tuple[str, str]]] = {
     r"fig1": [("theory", "(c ** 2 + n_passes * sigma ** 2) ** 0.5")],
-    r"fig(7|8|10|11|12|S1)_counts|fig7_shipped_counts": [
+    r"fig(7|8|10|11|12|S1)_counts|fig7_shipped_counts|fig8_translations_counts": [
         Proportion("share_always", "n_always", "n_unique", "low_always", "high_always")
     ],
     r"fig4_counts|floor_rates": [

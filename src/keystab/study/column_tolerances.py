@@ -64,13 +64,17 @@ _SHARES = (
     "share recall precision held found stability specificity sensitivity stable_below "
     "unstable_below new_rate lost_rate kept rejected share_always share_found share_right "
     "percentage_of_images percentage_of_unique percentage_seen mean_detections mean_above "
-    "mean_common auc best_auc gain n_new n_lost n_true n_found n_detections n_right n_twin"
+    "mean_common auc best_auc gain n_new n_lost n_true n_found n_detections n_right n_twin "
+    "extrema_ratio common_ratio unique_ratio octave_ratio ratio_drop share_duplicates above_dog "
+    "share_chance kept_always kept_others step"
 )
 _ENDS = (
     "low high low_detections high_detections low_above high_above low_always high_always "
     "low_found high_found low_right high_right new_low new_high lost_low lost_high recall_low "
     "recall_high precision_low precision_high auc_low auc_high rejected_low rejected_high "
-    "gain_low gain_high"
+    "gain_low gain_high low_extrema high_extrema low_common high_common low_unique high_unique "
+    "low_octave high_octave low_drop high_drop low_duplicates high_duplicates low_chance "
+    "high_chance low_step high_step low_kept high_kept low_others high_others"
 )
 
 COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
@@ -84,9 +88,14 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     (".*", _SHARES, COUNTED),
     (".*", _ENDS, COUNTED),
     ("fig1", "repeated_blur single_blur residual", SOLVED),
+    ("fig1_samplings", "increment .*_error moved_.d widened_.d", SOLVED),
     ("fig2", "mean standard_deviation", GREY),
     ("fig(2|12)_pixels", "value grey", GREY),
-    ("fig3", "median_condition q25_condition q75_condition", CONDITION),
+    (
+        "fig3",
+        "median_condition q25_condition q75_condition low_condition high_condition",
+        CONDITION,
+    ),
     ("fig4_keypoints|fig6", "y x sigma", SET),  # of discrete extrema: places of the grid
     ("fig4_summary", "value", COUNTED),
     ("fig5_features|predictors_detections", "dog", GREY),
@@ -96,9 +105,11 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     ("fig5_(roc|thresholds)", "threshold", Allowed(CONDITION.relative, STEPWISE.absolute)),
     ("fig6", "level", GREY),
     ("fig6_cubes", "value", GREY),
-    ("fig(7|8|S1)_precision", "mean median low high", SPREAD),
-    ("fig9_keypoints", "y x sigma", PLACE),
-    ("fig12_theory", "dog_noise octave_ratio", SOLVED),
+    ("fig(7|8|S1)_precision", "mean median low high low_median high_median", SPREAD),
+    ("fig(7|8|S1)_differences", "value other difference", COUNTED),
+    ("fig7_edges", "along across low_along high_along low_across high_across", SPREAD),
+    ("fig9_keypoints", "y x sigma scale_slope", PLACE),
+    ("fig12_theory", "dog_noise octave_ratio gaussian_noise gaussian_octave_ratio", SOLVED),
     ("figS2", "error value", SET),
     ("figS2", "scale_shift q25_shift q75_shift", SPREAD),
     ("figS2", "blob_shift dilation_shift", SOLVED),
@@ -110,10 +121,11 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     ("predictors_detections", "(stability|inside|truth)_.*", LEARNT),
     (
         "truth_.*|refinement_choices",
-        "median_location p90_location median_scale p90_scale",
+        "median_location p90_location rms_location median_scale p90_scale rms_scale",
         SPREAD,
     ),
     ("truth_views", "value", SET),
+    ("truth_views", "low_rms high_rms", SPREAD),
     ("uncertainty_.*", "level", SET),
     ("uncertainty_reliability", "predicted_survival", SPREAD),
     ("uncertainty_strata", "middle", Allowed(relative=1e-8, absolute=1e-8)),

@@ -25,6 +25,7 @@ ONCE_SEARCHED = {"shipped": "figure 7", "blur_errors": "figure S2"}
 
 SEARCHED_SETS = (
     *(about.views for about in FIGURES.values() if about.views and not about.swept),
+    "translations_wide",  # with which figure 8 is compared
     *ONCE_SEARCHED,
 )
 """Sets of views that are searched for keypoints."""

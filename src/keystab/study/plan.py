@@ -105,10 +105,10 @@ FIGURES = {
 STATED_SWEEPS = {"blur_zooms": "assumed_blur", "unbalanced": "delta_min", "large_scales": "noise"}
 """Sweeps of sets of views that answer statements of the text, and what their sets differ in."""
 
-TABLES_NOT_DRAWN = ("fig5_features.csv", "refinement.csv")
+TABLES_NOT_DRAWN = ("fig8_translations.csv", "refinement.csv")
 """Tables of a scene that no figure draws and no claim needs."""
 
-TABLES_OF_THEORY = ("figS3_ranges.csv",)
+TABLES_OF_THEORY = ("fig1_samplings.csv", "figS3_ranges.csv")
 """Tables of no scene that no figure draws and claims need."""
 
 TABLES_OF_SCENES = ("predictors_detections.parquet",)
@@ -244,6 +244,17 @@ def searches(settings: Settings, *sets: str) -> list[Searched]:
 def searches_of_figure(settings: Settings, figure: str) -> list[Searched]:
     """Sets of views that a figure studies, at all their samplings; of a sweep, each at one."""
     return searches(settings, *sets_of_figure(settings, figure))
+
+
+def scales_of_zooms(settings: Settings, end: int) -> float:
+    """One end of the range of scales that all views of figure 8 cover, over their first scale."""
+    views, comparison = settings["sets"]["zooms"], settings["comparison"]
+    zooms = [step / views["step"][0] for step in views["step"]]
+    ends = (
+        max(zooms) * comparison["first_scale"],
+        comparison["last_scale"] or 2.0 ** views["n_oct"],
+    )
+    return float(ends[end])
 
 
 def compared_with_scene(settings: Settings) -> list[Searched]:
