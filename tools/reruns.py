@@ -220,7 +220,7 @@ def _laid_over(above: Mapping[str, Any]) -> dict[str, Any]:
     return merged
 
 
-NAMES = r"^(sets|floor\.variants|predictors\.pictures)\.\w+"
+NAMES = r"^(sets|floor\.variants|floor\.pictures|predictors\.pictures)\.\w+"
 """Beginning of the places of settings that belong to something with a name of its own."""
 
 SPECIAL: dict[str, list[Any]] = {
@@ -229,6 +229,7 @@ SPECIAL: dict[str, list[Any]] = {
     "sets.*.dtype": ["float64", "float32"],
     "sets.*.assumed_blur": [0.65, 1.0],
     "floor.variants.*.set": ["still", "exact"],
+    "floor.pictures.*.sha256": [None],
     "predictors.pictures.*.sha256": [None],
 }
 """Values for settings whose others are not found by trying."""

@@ -133,8 +133,8 @@ class Arithmetic:
         Setting("floor.variants.{variant}.oversampling", "how the view is oversampled"),
     ]
     arithmetic: Annotated[
-        Literal["float64", "float32"],
-        Setting("floor.variants.{variant}.arithmetic", "number type of samples and comparisons"),
+        Literal["float64", "float32", "float32_sums", "float32_transforms"],
+        Setting("floor.variants.{variant}.arithmetic", "number type, and of what"),
     ]
     epsilon: Annotated[
         float, Setting("floor.variants.{variant}.epsilon", "least difference in single precision")
@@ -145,6 +145,21 @@ class Arithmetic:
     bits: Annotated[
         int | None, Setting("floor.variants.{variant}.bits", "bits of a pixel; None for floats")
     ]
+    sides: Annotated[
+        Literal["small", "large"],
+        Setting(
+            "floor.variants.{variant}.sides", "prime factors of the sides that are transformed"
+        ),
+    ]
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What the paper's words about new and lost extrema are taken to mean (figure floor)."""
+
+    settles_at: Annotated[int, Setting("floor.settles_at", "n_spo from which rates are averaged")]
+    epsilons: Annotated[list[float], Setting("floor.epsilons", "tolerances, of the grey range")]
+    limits: Annotated[list[float], Setting("floor.limits", "largest distances, pixels")]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from keystab.camera.view_sets import per_view, view_shapes, view_specs
-from keystab.study import job_resources, plan, scenes, settings
+from keystab.study import floor_variants, job_resources, plan, scenes, settings
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
@@ -153,7 +153,7 @@ def test_the_path_of_a_refinement_depends_on_the_offset_for_unit_steps_only():
 def test_variants_that_differ_in_the_tolerance_share_their_extrema():
     overlay = "{a: {bits: 8, epsilon: 1.0e-6}, b: {bits: 8, grey_range: 255.0, epsilon: 1.0}}"
     full = study(f"{{floor: {{variants: {overlay}}}}}")
-    by_name = {one.variant: one for one in plan.variants(full)}
+    by_name = {one.variant: one for one in floor_variants.variants(full)}
     assert by_name["epsilon_1e6"].run == "usual" and by_name["epsilon_1e6"].tolerance == 1e-6
     assert by_name["cosine"].run == "cosine" and by_name["float64_view"].run == "float64_view"
     assert by_name["a"].run == by_name["b"].run == "bits_8"
@@ -162,10 +162,38 @@ def test_variants_that_differ_in_the_tolerance_share_their_extrema():
     for name in ("single", "single_255"):
         assert by_name[name].run == name and by_name[name].tolerance == -1
     assert by_name["closer"].set == "closer"
+    # Each run is crossed with readings once, the first with all of them.
+    crossing = {name: one.crossing for name, one in by_name.items() if one.scene == "reference"}
+    assert [name for name, how in crossing.items() if how == "all"] == ["usual"]
+    assert crossing["bits_8"] == crossing["closer"] == "some"
+    assert crossing["a"] == crossing["epsilon_1e6"] == crossing["single"] == "none"
+
+
+def test_single_precision_that_takes_long_is_asked_for_where_rates_have_settled():
+    full = study("{floor: {settles_at: 17}}")
+    by_name = {one.variant: one for one in floor_variants.variants(full)}
+    assert floor_variants.samplings(full, "usual") == full["samplings"]["n_spo"]
+    for name in ("single_sums", "single_transforms", "single_transforms_prime"):
+        assert floor_variants.samplings(full, name) == [17, 18, 19]
+        assert by_name[name].crossing == "rates" and by_name[name].first == 17
+
+
+def test_further_pictures_have_the_usual_arithmetic_and_single_precision():
+    full = {**study("{floor: {pictures: {hill: {path: hill.png}}}}"), "place": "scenes/stream/"}
+    variants = floor_variants.variants(full)
+    own = [one for one in variants if one.scene == "reference"]
+    assert {one.place for one in own} == {"scenes/stream/"}
+    hill = [one for one in variants if one.scene == "hill"]
+    assert {one.place for one in hill} == {"scenes/hill/"}
+    kinds = ["usual", "single_sums", "single_transforms", "single_transforms_prime"]
+    assert [one.variant for one in hill] == [f"hill_{name}" for name in kinds]
+    assert [one.run for one in hill] == kinds
+    assert [one.words for one in hill][:2] == ["hill", "hill, sums in 32 bits"]
 
 
 def test_variants_are_said_in_words_that_follow_the_settings():
-    assert dict(zip(study()["floor"]["variants"], plan.differences(study()), strict=True)) == {
+    variants = floor_variants.variants(study("{floor: {pictures: {lake: null}}}"))
+    assert {one.variant: one.words for one in variants} == {
         "usual": "no tolerance",
         "epsilon_1e7": "tolerance 1.19e-7",
         "epsilon_1e6": "tolerance 1e-6",
@@ -174,22 +202,28 @@ def test_variants_are_said_in_words_that_follow_the_settings():
         "float64_view": "view in 64 bits",
         "bits_16": "view in 16 bits",
         "bits_8": "view in 8 bits",
-        "single": "single precision",
-        "single_255": "single precision, range 255",
+        "single": "Gaussians rounded to 32 bits",
+        "single_255": "Gaussians rounded to 32 bits, range 255",
         "range_255": "tolerance 1e-6, range 255",
         "closer": "S = 4",
         "closer_1e6": "S = 4, tolerance 1e-6",
+        "sharper": "c = 0.6",
+        "single_sums": "sums in 32 bits",
+        "single_transforms": "transforms in 32 bits",
+        "single_transforms_prime": "transforms in 32 bits, prime sides",
     }
     other = "{sets: {closer: {step: 5}}, floor: {variants: {usual: null, bits_8: {bits: 6}}}}"
-    words = plan.differences(study(other))
-    assert "S = 5" in words and "view in 6 bits" in words and len(words) == 12
+    words = [one.words for one in floor_variants.variants(study(other))]
+    assert "S = 5" in words and "view in 6 bits" in words and "no tolerance" not in words
 
 
 def test_single_precision_alone_is_told_its_tolerance_and_its_range():
     full = study("{floor: {variants: {single_255: {epsilon: 0.5}, range_255: {epsilon: 0.5}}}}")
     asked = [("single_255", "epsilon"), ("single_255", "grey_range"), ("range_255", "epsilon")]
-    assert [plan.of_single_precision(full, *each) for each in asked] == [0.5, 255.0, 0.0]
-    assert plan.of_single_precision(full, "range_255", "grey_range") == 1.0
+    assert [floor_variants.of_single_precision(full, *each) for each in asked] == [0.5, 255.0, 0.0]
+    assert floor_variants.of_single_precision(full, "range_255", "grey_range") == 1.0
+    prime = "single_transforms_prime"
+    assert floor_variants.of_single_precision(full, prime, "sides") == "large"
 
 
 # True extrema
@@ -216,7 +250,8 @@ def test_a_further_scene_is_the_same_study_of_another_picture():
     overlay = "{reference_blur: 0.5, sets: {still: {noise: 0.1, shift_y: 3, guard: 4}}}"
     given_settings = complete(overlay)
     places = scenes.by_place(given_settings, ROOT)
-    assert list(places) == ["", "scenes/stream/", "scenes/lanterns/"]
+    assert list(places) == ["", "scenes/stream/", "scenes/lanterns/", "scenes/lake/"]
+    assert all(own["place"] == place for place, own in places.items())
     own, other = places[""], places["scenes/stream/"]
     assert other["reference"] == "config/images/stream.png" and own["reference_blur"] == 0.5
     assert other["reference_blur"] == 0 and other["keep_scale_spaces"] is False
@@ -225,6 +260,7 @@ def test_a_further_scene_is_the_same_study_of_another_picture():
     assert still["blur"] == own["sets"]["still"]["blur"] and still["noise"] == [0.0]
     assert (still["shift_y"], still["guard"]) == ([0.0], 0)
     changed = {"reference", "reference_sha256", "reference_blur", "sets", "keep_scale_spaces"}
+    changed |= {"place"}
     assert {key for key in own if own[key] != other[key]} == changed
 
 
@@ -239,7 +275,7 @@ def test_the_step_of_a_scene_is_that_of_all_sets_that_share_the_step_of_the_view
 
 def test_places_are_those_of_scenes_that_there_are():
     pattern = re.compile(scenes.place_pattern(scenes.by_place(complete(), ROOT)))
-    assert all(map(pattern.fullmatch, ("", "scenes/stream/", "scenes/lanterns/")))
+    assert all(map(pattern.fullmatch, ("", "scenes/stream/", "scenes/lake/")))
     assert not any(map(pattern.fullmatch, ("scenes/coldwarm/", "scenes/", "tables/")))
     assert re.compile(scenes.place_pattern([""])).fullmatch("")
 

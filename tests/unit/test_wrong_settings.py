@@ -53,7 +53,7 @@ WRONG = [
     ("sets: {Still: {blur: 1.0}}", "sets has 'Still', allowed are names of small letters, digits and _ that start with a letter"),
     ("sets: {translation: {n_views: 2}}", "sets.translation is no set that figures are made from; did you mean sets.translations? Give another set a name that is less alike"),
     ("sets: {noise: {sweep: {sigma: [0.01]}}}", "sets.noise.sweep.sigma is no setting; the settings of sets.noise.sweep are blur, blur_spread, noise"),
-    ("floor: {variants: {usual: {set: near}}}", "floor.variants.usual.set is near, allowed are sets of views, such as exact, closer, examples"),
+    ("floor: {variants: {usual: {set: near}}}", "floor.variants.usual.set is near, allowed are sets of views, such as exact, closer, sharper"),
     ("floor: {variants: {new: {epsilom: 1.0e-6}}}", "floor.variants.new.epsilom is no setting; did you mean floor.variants.new.epsilon?"),
     # ranges
     ("detector: {sigma_min: -1.1}", "detector.sigma_min is -1.1, allowed is a number above 0"),
@@ -94,6 +94,9 @@ WRONG = [
     ("comparison: {unstable_below: 0.9}", "comparison.unstable_below is 0.9, allowed is a number below comparison.stable_above = 0.8"),
     ("stability: {curve_n_spo: [3, 16]}", "stability.curve_n_spo is [3, 16], allowed are members of n_spo of sets.translations, sets.zooms and sets.rotations, which share [3, 5, 9, 15, 19]"),
     ("stability: {starts: [3.0, 4.0]}", "stability.starts is [3.0, 4.0], allowed is at least one of at most 2.2: an octave from there must end within the 2 of sets.unknown_blur"),
+    ("floor: {variants: {single_transforms: {oversampling: cosine}}}", "floor.variants.single_transforms transforms in single precision with the cosine series, allowed is oversampling: spline"),
+    ("floor: {pictures: {stream: {path: config/images/lake.png}}}", "floor.pictures.stream has the name of another picture, that of predictors.pictures: give it a name of its own"),
+    ("floor: {pictures: {lake: {path: config/images/sea.png}}}", "floor.pictures.lake: {}/config/images/sea.png: no such file; give the path"),
     ("floor: {settles_at: 30}", "floor.settles_at is 30, allowed is at most 19, the last of samplings.n_spo"),
     ("samplings: {n_spo: [3, 15]}", "keep_scale_spaces has 19, allowed are members of samplings.n_spo = [3, 15]"),
     ("keep_scale_spaces: [40]", "keep_scale_spaces has 40, allowed are members of samplings.n_spo = [3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19]"),

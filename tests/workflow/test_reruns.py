@@ -99,7 +99,7 @@ def slow(*values):
         ("src/keystab/camera/simulation.py", *MORE, SIMULATION),
         # The contract for code: what depends on it, and nothing else.
         ("src/keystab/evaluation/intervals.py", *MORE, MATCHING | EVALUATING | BARS | {"count_refined", "view_statements"}),
-        ("src/keystab/evaluation/recall_precision.py", *MORE, EVALUATING),
+        ("src/keystab/evaluation/recall_precision.py", *MORE, EVALUATING | VARIANTS),
         ("src/keystab/detection/sift_filters.py", *MORE, {"match_sift", "fig7"}),
         ("src/keystab/utils/validation.py", *MORE, EVERYTHING - {"simulate", "describe_views", "semigroup", "crop_views", "fig1", "fig2"}),
         slow("src/keystab/parameters.py", "        str | None, Setting(\"reference_sha256\"", "        None | str, Setting(\"reference_sha256\"", SIMULATION),
@@ -141,6 +141,8 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("stability: {seen_by: 0.6}", {"match_sweep", "match_large_scales", "fig11", "fig12"}),
         # The inputs stay the same, but others belong to this variant.
         ("floor: {variants: {closer_1e6: {set: still}}}", VARIANTS),
+        ("floor: {limits: [0.3, 1.0]}", VARIANTS),
+        ("floor: {pictures: {lake: {step: 20}}}", VARIANTS | {"simulate", "detect_variant"}),
         ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "evaluate_views", "truth"}),
         ("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
         ("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
@@ -157,7 +159,7 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("stated: {zooms: [1.6]}", {"view_statements"}),
         ("sets: {tilts: {focal_length: 330}}", {"simulate", "detect_views", "match_views", "figS5"}),
         ("sets: {zooms: {zoom: 1.4}}", {"simulate", "detect_views", "match_views", "match_translations", "fig8"}),
-        ("truth: {last_scale: 1.9}", EVALUATING | TRUTHS),
+        ("truth: {last_scale: 1.9}", EVALUATING | TRUTHS | VARIANTS),
         ("truth: {most_iterations: 4}", {"evaluate_refinement", "refinement"}),
         ("uncertainty: {n_pairs: 3}", BARS),
         ("sets: {shots: {blur: [0.8, 0.9]}}", BARS | {"simulate"}),

@@ -17,7 +17,8 @@ import yaml
 from keystab import parameters
 from keystab.errors import InputError
 from keystab.provenance import code_digest, imported_software
-from keystab.study import claims_by_scene, feasibility, job_resources, plan, scenes, settings
+from keystab.study import claims_by_scene, feasibility, floor_variants, job_resources, plan, scenes
+from keystab.study import settings
 from keystab.study.claims import read_claims, table_names
 from keystab.study.rule_parameters import Rules
 

@@ -146,10 +146,10 @@ rule detect_kappas:
 
 
 rule detect_variant:
-    """Detect the extrema of all balanced samplings in one variant of the arithmetic."""
+    """Detect the extrema of balanced samplings in one variant of the arithmetic or the camera."""
     input:
-        views=ancient(files("views/{set}", plan.variant, "{variant}")),
-        views_digest=files("views/{set}.sha256", plan.variant, "{variant}"),
+        views=ancient(files("views/{set}", floor_variants.variant, "{variant}")),
+        views_digest=files("views/{set}.sha256", floor_variants.variant, "{variant}"),
     output:
         extrema=f"{HERE}keypoints/floor/{{variant}}.parquet",
     log:
@@ -161,11 +161,12 @@ rule detect_variant:
     params:
         **stage(
             "detect_variant",
-            "samplings.n_spo",
             parameters.Scales,
             parameters.Arithmetic,
-            epsilon=of(plan.of_single_precision, "{variant}", "epsilon"),
-            grey_range=of(plan.of_single_precision, "{variant}", "grey_range"),
+            n_spo=of(floor_variants.samplings, "{variant}"),
+            epsilon=of(floor_variants.of_single_precision, "{variant}", "epsilon"),
+            grey_range=of(floor_variants.of_single_precision, "{variant}", "grey_range"),
+            sides=of(floor_variants.of_single_precision, "{variant}", "sides"),
         ),
     message:
         "Detecting extrema in the variant '{wildcards.variant}'{params.scene}"

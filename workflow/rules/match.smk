@@ -151,15 +151,18 @@ rule cut_cubes:
 
 
 rule match_variants:
-    """Figure floor: rates of new and lost extrema in every variant of the arithmetic."""
+    """Figure floor: new and lost extrema in every variant and in every reading, and their causes."""
     input:
-        views=ancient(files("views/{set}", plan.variants)),
-        views_digest=files("views/{set}.sha256", plan.variants),
-        extrema=files("keypoints/floor/{run}.parquet", plan.variants),
+        views=ancient(files("views/{set}", floor_variants.variants)),
+        views_digest=files("views/{set}.sha256", floor_variants.variants),
+        extrema=files("keypoints/floor/{run}.parquet", floor_variants.variants),
+        truth=f"{HERE}truth/view.parquet",
     output:
         rates=f"{HERE}tables/floor_rates.csv",
         summary=f"{HERE}tables/floor_summary.csv",
         variants=f"{HERE}tables/floor_variants.csv",
+        crossed=f"{HERE}tables/floor_readings.csv",
+        causes=f"{HERE}tables/floor_causes.csv",
     log:
         f"{LOG}match_variants.log",
     benchmark:
@@ -168,17 +171,21 @@ rule match_variants:
         **stage(
             "match_variants",
             "samplings.n_spo",
-            "floor.settles_at",
+            "detector.epsilon",
             parameters.Scales,
             parameters.Same,
             parameters.Compared,
-            names=column("variant", plan.variants),
-            differences=of(plan.differences),
-            tolerances=column("tolerance", plan.variants),
+            parameters.Readings,
+            names=column("variant", floor_variants.variants),
+            scenes=column("scene", floor_variants.variants),
+            differences=column("words", floor_variants.variants),
+            tolerances=column("tolerance", floor_variants.variants),
+            firsts=column("first", floor_variants.variants),
+            crossings=column("crossing", floor_variants.variants),
         ),
         # Which extrema belong to which variant: Snakemake compares inputs without their order.
-        runs=parameter("runs", column("run", plan.variants)),
+        runs=parameter("runs", column("run", floor_variants.variants)),
     message:
-        "Counting new and lost extrema in all variants{params.scene}"
+        "Counting new and lost extrema in all variants and readings{params.scene}"
     shell:
         "{params.command} >{log:q} 2>&1"

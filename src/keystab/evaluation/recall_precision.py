@@ -13,7 +13,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from keystab.evaluation.intervals import normal_half_width, wilson_interval
-from keystab.matching.correspondence import SCALE_RATIO, SPACE_TOLERANCE, pairs_between
+from keystab.matching.correspondence import (
+    SCALE_RATIO,
+    SPACE_TOLERANCE,
+    one_to_one,
+    pairs_between,
+)
 
 DEGENERATE = 0.03
 """Conditioning (see `keystab.true_extrema`) below which a true extremum counts as nearly
@@ -60,20 +65,33 @@ def partners(
     >>> partners(found, truth).tolist()
     [-1, 0, -1]
     """
-    return _paired(detections, truth, space_tolerance, scale_ratio)[0]
+    return partners_and_near(detections, truth, space_tolerance, scale_ratio)[0]
 
 
-def _paired(
-    detections: pd.DataFrame, truth: pd.DataFrame, space_tolerance: float, scale_ratio: float
+def partners_and_near(
+    detections: pd.DataFrame,
+    truth: pd.DataFrame,
+    space_tolerance: float = SPACE_TOLERANCE,
+    scale_ratio: float = SCALE_RATIO,
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """`partners`, and whether each detection is near any true extremum, taken or not."""
+    """`partners`, and whether each detection is near any true extremum, taken or not.
+
+    Parameters
+    ----------
+    detections, truth, space_tolerance, scale_ratio
+        See `partners`.
+
+    Returns
+    -------
+    partner : ndarray of int, shape (n_detections,)
+        See `partners`.
+    near : ndarray of bool, shape (n_detections,)
+        True with -1 for a partner where the extremum stands for a nearer detection.
+    """
     a, b, distance = pairs_between(detections, truth, space_tolerance, scale_ratio, True)
     partner = np.full(len(detections), -1, dtype=np.intp)
-    taken = np.zeros(len(truth), dtype=bool)
-    for k in np.lexsort((b, a, distance)):
-        if partner[a[k]] < 0 and not taken[b[k]]:
-            partner[a[k]] = b[k]
-            taken[b[k]] = True
+    chosen = one_to_one(a, b, distance)
+    partner[a[chosen]] = b[chosen]
     near = np.zeros(len(detections), dtype=bool)
     near[a] = True
     return partner, near
@@ -111,7 +129,7 @@ def recall_and_precision(
         ``|log2(sigma / sigma_true)|`` in octaves, and their root mean squares ``rms_location,
         rms_scale``. NaN where there are none.
     """
-    partner, near = _paired(detections, truth, space_tolerance, scale_ratio)
+    partner, near = partners_and_near(detections, truth, space_tolerance, scale_ratio)
     paired = np.flatnonzero(partner >= 0)
     found = np.zeros(len(truth), dtype=bool)
     found[partner[paired]] = True
@@ -238,7 +256,7 @@ def causes(
     >>> causes(found, truth, 1.386, 2.2).tolist()
     ['true', 'twin', 'edge', 'nothing']
     """
-    partner, near = _paired(detections, truth, space_tolerance, scale_ratio)
+    partner, near = partners_and_near(detections, truth, space_tolerance, scale_ratio)
     cause = np.where(near, "twin", "nothing").astype("<U10")
     paired = partner >= 0
     own = truth.iloc[partner[paired]]

@@ -161,15 +161,18 @@ def change_counts(
     return counts
 
 
-def floor_summary(counts: pd.DataFrame, stability: pd.Series, settles_at: int) -> pd.DataFrame:
+def floor_summary(
+    counts: pd.DataFrame, stability: pd.Series | None, settles_at: int
+) -> pd.DataFrame:
     """Rates of new and lost extrema where they have settled, in one row (figure floor).
 
     Parameters
     ----------
     counts : DataFrame
         From `change_counts`.
-    stability : Series
-        Share of the samplings in which each unique keypoint is detected.
+    stability : Series or None
+        Share of the samplings in which each unique keypoint is detected; None where coarse
+        samplings were not searched.
     settles_at : int
         Rates are those of the samplings with at least this `n_spo`, weighted by their detections.
 
@@ -178,21 +181,24 @@ def floor_summary(counts: pd.DataFrame, stability: pd.Series, settles_at: int) -
     DataFrame
         ``mean_common`` (compared detections per sampling), ``new_rate, new_low, new_high``,
         ``lost_rate, lost_low, lost_high`` (shares with 95 % Wilson intervals), ``n_unique``,
-        ``share_always`` with ``low_always, high_always``; NaN where nothing is detected.
+        ``share_always`` with ``low_always, high_always``; NaN where nothing is detected or known.
     """
     settled = counts[counts["n_spo"] >= settles_at]
-    row: dict[str, float] = {"mean_common": settled["n_common"].mean()}
+    row: dict[str, Any] = {"mean_common": settled["n_common"].mean()}
     for name in ("new", "lost"):
         known = settled[settled[f"n_{name}"].notna()]
         k, n = int(known[f"n_{name}"].sum()), int(known["n_common"].sum())
         low, high = wilson_interval(k, n)
         row |= {f"{name}_rate": k / n if n else np.nan}
         row |= {f"{name}_low": float(low), f"{name}_high": float(high)}
+    if stability is None:
+        unknown = dict.fromkeys(("share_always", "low_always", "high_always"), np.nan)
+        return pd.DataFrame([row | {"n_unique": pd.NA} | unknown]).astype({"n_unique": "Int64"})
     always = int((stability == 1).sum())
     low, high = wilson_interval(always, len(stability))
     row |= {"n_unique": len(stability), "share_always": always / max(len(stability), 1)}
     row |= {"low_always": float(low), "high_always": float(high)}
-    return pd.DataFrame([row])
+    return pd.DataFrame([row]).astype({"n_unique": "Int64"})
 
 
 class Matched(NamedTuple):

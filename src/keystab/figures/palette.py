@@ -78,6 +78,16 @@ CAUSE_COLOURS = {
 }
 """What a keypoint is, from right to wrong (figure truth)."""
 
+CHANGE_CAUSE_COLOURS = {
+    "edge": "#bdbdbd",
+    "degenerate": CAUSE_COLOURS["degenerate"],
+    "second": CAUSE_COLOURS["twin"],
+    "merged": "#A8458A",
+    "missed": "#0072B2",
+    "false": CAUSE_COLOURS["nothing"],
+}
+"""Why extrema come and go (figure floor); what figure truth has too has its colour there."""
+
 PICTURE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#A8458A", "#8a6d00")
 """Pictures, in their order; the first one is the study's (figure predictors)."""
 

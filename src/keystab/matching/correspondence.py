@@ -191,6 +191,43 @@ def pairs_between(
     return near["i"], near["j"], np.sqrt((apart**2).sum(axis=1))
 
 
+def one_to_one(
+    row_a: NDArray[np.intp], row_b: NDArray[np.intp], distance: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """Choose among pairs so that no row is in two of them, the nearest pairs first.
+
+    Parameters
+    ----------
+    row_a, row_b : ndarray of int, shape (n_pairs,)
+        Rows of two tables, as from `pairs_between`.
+    distance : ndarray, shape (n_pairs,)
+        How far apart each pair is. Equal ones are taken by `row_a`, then `row_b`.
+
+    Returns
+    -------
+    ndarray of int
+        Positions of the chosen pairs. What is left out shares a row with a chosen pair that is not
+        farther apart.
+
+    Examples
+    --------
+    >>> one_to_one(np.array([0, 0, 1]), np.array([0, 1, 0]), np.array([0.1, 0.3, 0.2])).tolist()
+    [0]
+    """
+    left = np.lexsort((row_b, row_a, distance))
+    free_a = np.ones(row_a.max(initial=-1) + 1, dtype=bool)
+    free_b = np.ones(row_b.max(initial=-1) + 1, dtype=bool)
+    chosen = [left[:0]]
+    while left.size:
+        # A pair that comes first among those of both its rows is chosen whatever comes after.
+        first_a, first_b = (np.unique(row[left], return_index=True)[1] for row in (row_a, row_b))
+        best = left[np.intersect1d(first_a, first_b)]
+        free_a[row_a[best]] = free_b[row_b[best]] = False
+        left = left[free_a[row_a[left]] & free_b[row_b[left]]]
+        chosen.append(best)
+    return np.concatenate(chosen)
+
+
 def _coordinates(
     detections: Detections,
     space_tolerance: float,

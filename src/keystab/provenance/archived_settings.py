@@ -245,8 +245,9 @@ def _paths(settings: Settings) -> Iterator[tuple[str, str]]:
     """Paths of files that settings name, each with its place."""
     if "reference" in settings:
         yield "reference", settings["reference"]
-    for name, picture in settings.get("predictors", {}).get("pictures", {}).items():
-        yield f"predictors.pictures.{name}.path", picture["path"]
+    for block in ("predictors", "floor"):
+        for name, picture in settings.get(block, {}).get("pictures", {}).items():
+            yield f"{block}.pictures.{name}.path", picture["path"]
     for path in settings.get("pictures", ()):
         yield "pictures", path
 

@@ -74,8 +74,11 @@ Comparison
     kappa : ratio of the two blurs
     tolerances : least difference in each variant, of grey values in [0, 1]; -1 where it was applied
     differences : what each variant differs in, in words
+    scenes : name of the scene of each variant
+    firsts : first of the samplings of each variant
+    crossings : readings that each variant is crossed with, all, some, those that rates need, none
+    crossed : table of rates in each reading
     variants : table of these words
-    settles_at : n_spo from which rates are averaged
     rates : table of rates of new and lost extrema
 
 Scores

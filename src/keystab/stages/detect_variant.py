@@ -1,7 +1,7 @@
 """Detect the extrema of all balanced samplings in one variant of the arithmetic (figure floor).
 
 In double precision no tolerance is applied: the table says by how much each extremum differs from
-its neighbours, so that any is chosen afterwards.
+its neighbours, so that any is chosen afterwards. So it does of single precision in all steps.
 """
 
 from pathlib import Path
@@ -18,8 +18,7 @@ def main(
     import pandas as pd
 
     from keystab.detection.detector import extrema_table
-    from keystab.detection.extrema import discrete_extrema
-    from keystab.detection.single_precision import quantised, single_precision_extrema
+    from keystab.detection.single_precision import extrema_in_arithmetic, quantised
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
     from keystab.parameters import DifferenceOfGaussians
@@ -33,11 +32,10 @@ def main(
     parts = []
     for n in progress(n_spo, len(n_spo), "samplings"):
         space = sampled_space(view, n, dog)
-        if variant.arithmetic == "float32":
-            found = single_precision_extrema(space, variant.epsilon, variant.grey_range)
-        else:
-            found = discrete_extrema(space)
-        table = extrema_table(space, found)[columns]
+        found, cubes = extrema_in_arithmetic(
+            space, variant.arithmetic, variant.epsilon, variant.grey_range, variant.sides
+        )
+        table = extrema_table(space, found, cubes)[columns]
         table.insert(0, "n_spo", n)
         table.insert(1, "delta_min", space.sampling.delta_min)
         parts.append(table)

@@ -63,6 +63,7 @@ RELATIONS: dict[str, list[Proportion | tuple[str, str]]] = {
     r"fig1[12]_scales": [Proportion("percentage_seen", "n_seen", "n_unique", percent=True)],
     r"truth_(samplings|cosine|grid|kappas)": [_RECALL, _PRECISION],
     r"truth_causes": [Proportion("share", "n", "n_group", "low", "high")],
+    r"floor_causes": [Proportion("rate", "n", "n_common", "low", "high")],
     r"figS3": [("c_um", "c * pitch")],
     r"figS4": [("error", "detected / theory - 1")],
     r"predictors_gain": [("gain", "auc - best_auc")],

@@ -62,7 +62,7 @@ LEARNT = Allowed(absolute=1e-6)
 
 _SHARES = (
     "share recall precision held found stability specificity sensitivity stable_below "
-    "unstable_below new_rate lost_rate kept rejected share_always share_found share_right "
+    "unstable_below rate new_rate lost_rate kept rejected share_always share_found share_right "
     "percentage_of_images percentage_of_unique percentage_seen mean_detections mean_above "
     "mean_common auc best_auc gain n_new n_lost n_true n_found n_detections n_right n_twin "
     "extrema_ratio common_ratio unique_ratio octave_ratio ratio_drop share_duplicates above_dog "
@@ -82,7 +82,7 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
         ".*",
         "n_spo delta_min kappa blur step noise blur_spread sigma_from seen_by max_offset c level "
         "max_iterations sigma sigma_min pitch f_number w20 w40 wavelength fill_factor camera_blur "
-        "assumed_blur theory radius",
+        "assumed_blur theory radius epsilon limit",
         SET,
     ),
     (".*", _SHARES, COUNTED),

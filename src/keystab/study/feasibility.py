@@ -140,6 +140,22 @@ def setting_problems(settings: Settings) -> list[str]:
                 f"floor.variants.{name}.set is {variant['set']}, allowed are sets of views, "
                 f"such as {', '.join(close)}"
             )
+        if variant["arithmetic"] == "float32_transforms" and variant["oversampling"] != "spline":
+            problems.append(
+                f"floor.variants.{name} transforms in single precision with the "
+                f"{variant['oversampling']} series, allowed is oversampling: spline"
+            )
+    if not any(one["arithmetic"] == "float64" for one in settings["floor"]["variants"].values()):
+        problems.append(
+            "floor.variants has none in double precision, whose extrema are read in all ways; keep "
+            "one with arithmetic: float64"
+        )
+    problems += [
+        f"floor.pictures.{name} has the name of another picture, that of predictors.pictures: "
+        "give it a name of its own"
+        for name, picture in settings["predictors"]["pictures"].items()
+        if picture["path"] != settings["floor"]["pictures"].get(name, picture)["path"]
+    ]
     problems += _order(settings["comparison"], "comparison", "unstable_below", "stable_above")
     if settings["comparison"]["last_scale"] is not None:
         problems += _order(settings["comparison"], "comparison", "first_scale", "last_scale")

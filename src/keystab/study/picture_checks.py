@@ -29,7 +29,7 @@ Settings = Mapping[str, Any]
 
 
 def further_picture_problems(settings: Settings, folder: Path) -> list[str]:
-    """One line for every further picture of figure predictors that cannot be used."""
+    """One line for every picture of figures predictors and floor that cannot be used."""
     names = further_pictures(settings, folder)
     if not names:
         return [
@@ -38,17 +38,19 @@ def further_picture_problems(settings: Settings, folder: Path) -> list[str]:
         ]
     least = math.ceil(2 * settings["comparison"]["border"]) + 3
     problems = []
-    for name in names:
-        picture = settings["predictors"]["pictures"][name]
+    further = [("predictors", name) for name in names]
+    further += [("floor", name) for name in settings["floor"]["pictures"]]
+    for block, name in further:
+        picture = settings[block]["pictures"][name]
         try:
             shape = picture_shape(folder / picture["path"])
         except InputError as error:
-            problems.append(f"predictors.pictures.{name}: {error}")
+            problems.append(f"{block}.pictures.{name}: {error}")
             continue
         height, width = (int(size / picture["step"]) for size in shape)
         if min(height, width) < least:
             problems.append(
-                f"predictors.pictures.{name}.step is {picture['step']:g}, which gives a view of "
+                f"{block}.pictures.{name}.step is {picture['step']:g}, which gives a view of "
                 f"{height} x {width} px, allowed are sides of at least {least} px: lower it"
             )
     return problems

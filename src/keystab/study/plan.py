@@ -6,7 +6,6 @@ All functions are pure. They take the settings of one scene as `keystab.study.sc
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -70,7 +69,15 @@ FIGURES = {
     # stability and precision when the scene is seen from the side
     "figS5": Figure(("figS5_counts.csv", "figS5_precision.csv"), "tilts"),
     # why extrema come and go at any density
-    "floor": Figure(("floor_rates.csv", "floor_summary.csv", "floor_variants.csv")),
+    "floor": Figure(
+        (
+            "floor_rates.csv",
+            "floor_summary.csv",
+            "floor_variants.csv",
+            "floor_readings.csv",
+            "floor_causes.csv",
+        )
+    ),
     # detections against the true extrema
     "truth": Figure(
         (
@@ -326,79 +333,6 @@ def max_offset_of_path(settings: Settings) -> float:
     """
     refinement = settings["refinement"]
     return refinement["max_offset"] if refinement["move"] == "unit_step" else 0.5
-
-
-# ---------------------------------------------------------------------------------------------
-# Variants of the arithmetic
-
-
-class Variant(NamedTuple):
-    """A variant of the arithmetic (figure floor)."""
-
-    variant: str
-    set: str
-    """Set of views whose first one is searched."""
-    run: str
-    """Variant whose extrema serve this one too."""
-    tolerance: float
-    """Least difference of its extrema, of grey values in [0, 1]; -1 where it was applied."""
-
-
-def variants(settings: Settings) -> list[Variant]:
-    """All variants.
-
-    Variants whose extrema are the same but for the tolerance, which comes later, share the run of
-    the first of them. Single precision rounds in units of its own grey range: its variants stand
-    alone, and their tolerance is applied at once.
-    """
-    found: list[Variant] = []
-    runs: dict[tuple[Any, ...], str] = {}
-    for name, variant in settings["floor"]["variants"].items():
-        if variant["arithmetic"] == "float32":
-            found.append(Variant(name, variant["set"], name, -1.0))
-        else:
-            same = tuple(variant[key] for key in ("set", "oversampling", "arithmetic", "bits"))
-            run = runs.setdefault(same, name)
-            tolerance = variant["epsilon"] / variant["grey_range"]
-            found.append(Variant(name, variant["set"], run, tolerance))
-    return found
-
-
-def variant(settings: Settings, name: str) -> list[Variant]:
-    """One variant, as the only one of a list."""
-    return [each for each in variants(settings) if each.variant == name]
-
-
-def differences(settings: Settings) -> list[str]:
-    """Say in what each variant differs from the usual one, which has no tolerance, in words."""
-    sets, all_variants = settings["sets"], settings["floor"]["variants"]
-    usual = all_variants.get("usual") or next(iter(all_variants.values()))
-    before = sets[usual["set"]]
-    found = []
-    for own in all_variants.values():
-        views, bits = sets[own["set"]], own["bits"]
-        tolerance = re.sub("e-0*", "e-", f"{own['epsilon']:g}")
-        parts = {
-            f"S = {views['step'][0]:g}": views["step"][0] != before["step"][0],
-            f"view in {views['dtype'].removeprefix('float')} bits": views["dtype"]
-            != before["dtype"],
-            f"view in {bits} bits": bits is not None,
-            f"{own['oversampling']} series, not {usual['oversampling']}": own["oversampling"]
-            != usual["oversampling"],
-            "single precision": own["arithmetic"] == "float32",
-            f"tolerance {tolerance}": own["epsilon"] > 0,
-            f"range {own['grey_range']:g}": own["grey_range"] != 1,
-        }
-        words = [part for part, differs in parts.items() if differs]
-        found.append(", ".join(words) or "no tolerance")
-    return found
-
-
-def of_single_precision(settings: Settings, name: str, key: str) -> float:
-    """Setting of a variant that single precision alone uses; else one without effect."""
-    own = settings["floor"]["variants"][name]
-    usual = {"epsilon": 0.0, "grey_range": 1.0}[key]
-    return own[key] if own["arithmetic"] == "float32" else usual
 
 
 # ---------------------------------------------------------------------------------------------

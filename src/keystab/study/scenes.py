@@ -1,8 +1,8 @@
 """The scenes of a study, each with settings of its own, and the place of its results.
 
 The default scene is the picture ``reference``; its results lie in the folder ``results``. Further
-ones are the pictures of figure predictors; theirs lie in ``scenes/NAME/`` in that folder. All are
-made by the same rules.
+ones are the pictures of figures predictors and floor; theirs lie in ``scenes/NAME/`` in that
+folder. All are made by the same rules.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ Settings = Mapping[str, Any]
 def by_place(settings: Settings, folder: Path | str = ".") -> dict[str, dict[str, Any]]:
     """Settings of every scene by the place of its results, which is ``""`` for the default scene.
 
+    They say their place themselves, as ``place``.
+
     Parameters
     ----------
     settings : mapping
@@ -32,11 +34,10 @@ def by_place(settings: Settings, folder: Path | str = ".") -> dict[str, dict[str
     >>> place_pattern({"": {}, "scenes/stream/": {}, "scenes/roof/": {}})
     '(scenes/stream/|scenes/roof/)?'
     """
-    others = further_pictures(settings, folder)
-    return {
-        "": resolved(settings),
-        **{f"scenes/{name}/": resolved(with_scene(settings, name)) for name in others},
-    }
+    others = dict.fromkeys([*further_pictures(settings, folder), *settings["floor"]["pictures"]])
+    found = {"": resolved(settings)}
+    found |= {f"scenes/{name}/": resolved(with_scene(settings, name)) for name in others}
+    return {place: {**own, "place": place} for place, own in found.items()}
 
 
 def place_pattern(places: Iterable[str]) -> str:
@@ -83,7 +84,7 @@ def with_scene(settings: Settings, name: str) -> dict[str, Any]:
     Its view ``still`` has the blur of that of the reference and a step of its own, which all sets
     have that share the step of ``still``; no scale-space of it is kept.
     """
-    picture = settings["predictors"]["pictures"][name]
+    picture = {**settings["floor"]["pictures"], **settings["predictors"]["pictures"]}[name]
     still = settings["sets"]["still"]
     sets = {
         key: {**views, "step": picture["step"]} if views["step"] == still["step"] else views
