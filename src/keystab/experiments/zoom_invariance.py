@@ -23,10 +23,12 @@ from keystab.evaluation.intervals import wilson_interval
 from keystab.experiments.interpolation_stability import rank_interval
 from keystab.matching.common_range import CommonRange
 from keystab.matching.correspondence import pairs_between
-from keystab.utils import validation
 
 #: Margin in units of the largest blur; scales beyond the range at which counterparts are sought.
 _MARGIN, _BEYOND = 6.0, 1.05
+
+#: By how much the first view is finer than the one that is given.
+_FINER = 2.5
 
 
 def zoomed_views(
@@ -41,9 +43,9 @@ def zoomed_views(
     Parameters
     ----------
     spec : ViewSpec
-        The first view.
+        A view of the whole scene. The first view here is finer, for more extrema.
     zooms : sequence of float
-        Zooms of the others against it, above 1.
+        Zooms of the others against the first, above 1.
     reference_shape : tuple of int
         Height and width of the reference in pixels.
     sigma_min : float
@@ -64,16 +66,14 @@ def zoomed_views(
     >>> spec = ViewSpec(blur=1.1, step=10.0, shape=(100, 150))
     >>> everywhere, ends = zoomed_views(spec, [1.5], (1000, 1500), 1.1, 1.25)
     >>> everywhere.specs[1].shape, everywhere.margin, ends[1][0].__round__(9)
-    ((66, 100), 26.0, 1.1)
+    ((166, 250), 26.0, 1.1)
     """
-    specs = [spec]
-    for zoom in zooms:
-        step = spec.step * validation.number("zooms", zoom, above=1)
-        specs.append(replace(spec, step=step, shape=whole_shape(reference_shape, step)))
+    steps = [spec.step / _FINER * zoom for zoom in (1.0, *zooms)]
+    specs = [replace(spec, step=s, shape=whole_shape(reference_shape, s)) for s in steps]
     low = _BEYOND * sigma_min * max(1.0, *zooms)
     margin = math.ceil(_MARGIN * kappa * 2 * low)
     everywhere = CommonRange(specs, reference_shape, float(margin), low, 2 * low)
-    ratios = [view.step / spec.step for view in specs]
+    ratios = [view.step / specs[0].step for view in specs]
     return everywhere, [(low / _BEYOND / r, 2 * low * _BEYOND / r) for r in ratios]
 
 
