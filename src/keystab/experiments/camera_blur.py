@@ -126,7 +126,7 @@ def range_table(
     --------
     >>> table = range_table([1.4, 5.6], [6.5], [20.0], shares=[0.0, 1.0])
     >>> table[["defocus", "smallest", "largest"]].round(2).to_numpy().tolist()
-    [[0.0, 0.36, 0.4], [28.0, 0.41, 0.95]]
+    [[0.0, 0.36, 0.39], [28.0, 0.41, 0.95]]
     """
     import pandas as pd
 
