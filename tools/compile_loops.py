@@ -44,11 +44,11 @@ if __name__ == "__main__":
     from keystab.prediction.uncertainty import keypoint_uncertainty
     from keystab.truth.true_extrema import true_extrema
 
-    picture = np.random.default_rng(0).random((40, 40))
+    picture, large = (np.random.default_rng(0).random((side, side)) for side in (40, 88))
     for oversampling in ("spline", "cosine"):
         detect_keypoints(picture, 0.5, n_spo=4, oversampling=oversampling)
         detect_keypoints(picture, 1.1, n_spo=12, oversampling=oversampling)
-        detect_keypoints(picture, 1.1, n_spo=18, oversampling=oversampling)  # from few samples
+        detect_keypoints(large, 1.1, n_spo=18, oversampling=oversampling)  # from few samples
     true_extrema(picture, 0.5, n_spo=[4])
     extrema_of_array(np.zeros((3, 3, 3)), 0.0)
     keypoint_uncertainty(picture, 0.5, (0.01, 0.01), n_spo=4)
