@@ -104,7 +104,12 @@ def reports(**holds: dict[str, int]) -> dict[str, pd.DataFrame]:
         for numbers in left.values():
             verdicts.append("reproduced" if numbers.get(family, 0) > 0 else "not reproduced")
             numbers[family] = numbers.get(family, 0) - 1
-        table = {"id": list(holds), "criterion": "a > b", "verdict": verdicts, "value": "share 0.5"}
+        table = {
+            "id": list(holds),
+            "criterion": "a > b",
+            "verdict": verdicts,
+            "value": f"share {len(found)}",
+        }
         found[scene] = pd.DataFrame(table)
     return found
 
@@ -134,6 +139,17 @@ def test_claims_are_general_dependent_undecided_or_nowhere_true():
         "nowhere": "generally not",
     }
     assert found.loc["but_text", ["n_scenes", "n_holds", "text_n", "text_holds"]].tolist() == [33, 27, 6, 0]  # fmt: skip
+
+
+def test_what_gives_the_same_numbers_on_all_scenes_is_of_no_scene():
+    given = reports(one=ALL_OF, other=ALL_OF)
+    for report in given.values():
+        report.loc[1, "value"] = "error 1.5e-13"
+    found = scene_verdicts.over_scenes(scene_verdicts.long_table(given, FAMILIES))
+    assert found["kind"].tolist() == ["general", "of no scene"]
+    two = {name: given[name] for name in ("lake", "text_1")}
+    found = scene_verdicts.over_scenes(scene_verdicts.long_table(two, FAMILIES))
+    assert found["kind"].tolist() == ["undecided", "undecided"]
 
 
 def test_what_no_scene_can_test_is_said_to_be_so():

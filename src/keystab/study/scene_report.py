@@ -8,7 +8,15 @@ from typing import Any
 import pandas as pd
 
 from keystab.study.claims_report import cell
-from keystab.study.scene_verdicts import DEPENDS, GENERAL, GENERALLY_NOT, KINDS, NOWHERE, UNDECIDED
+from keystab.study.scene_verdicts import (
+    DEPENDS,
+    GENERAL,
+    GENERALLY_NOT,
+    KINDS,
+    NO_SCENE,
+    NOWHERE,
+    UNDECIDED,
+)
 
 __all__ = ["to_markdown"]
 
@@ -17,6 +25,7 @@ _SAID = {
     DEPENDS: "depend on the family (exact test, corrected for all claims, p below 0.01)",
     UNDECIDED: "are undecided: neither, with so many scenes",
     GENERALLY_NOT: "hold on hardly any scene (the upper end of the interval is below 0.2)",
+    NO_SCENE: "are about theory: all scenes give the same numbers",
     NOWHERE: "could be tested on no scene",
 }
 

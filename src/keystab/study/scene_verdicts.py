@@ -12,6 +12,8 @@ Rules, written before the corpus was run, of the scenes on which a claim can be 
 *scene-dependent*
     Neither, and families differ: Fisher's exact test of families against holding, as Freeman and
     Halton extended it, has p < 0.01 after Holm's correction for all claims that are asked.
+*of no scene*
+    Three scenes or more, and all give the same numbers to the last digit: it is about theory.
 *undecided*
     Anything else. With one of three scenes too few to tell, more scenes would.
 
@@ -35,13 +37,13 @@ from keystab.study.verdicts import REPRODUCED, UNTESTED
 
 __all__ = ["GENERAL", "KINDS", "by_family", "families_differ", "holm", "long_table", "over_scenes"]
 
-GENERAL, GENERALLY_NOT, DEPENDS, UNDECIDED, NOWHERE = (
-    "general", "generally not", "scene-dependent", "undecided", "not testable",
+GENERAL, GENERALLY_NOT, DEPENDS, UNDECIDED, NO_SCENE, NOWHERE = (
+    "general", "generally not", "scene-dependent", "undecided", "of no scene", "not testable",
 )  # fmt: skip
-KINDS = (GENERAL, DEPENDS, UNDECIDED, GENERALLY_NOT, NOWHERE)
+KINDS = (GENERAL, DEPENDS, UNDECIDED, GENERALLY_NOT, NO_SCENE, NOWHERE)
 """What a claim can be over scenes, in the order of tables."""
 
-_HOLDS, _FAILS, _LEVEL = 0.8, 0.2, 0.01
+_HOLDS, _FAILS, _LEVEL, _FEWEST = 0.8, 0.2, 0.01, 3
 
 
 def long_table(reports: Mapping[str, pd.DataFrame], families: Mapping[str, str]) -> pd.DataFrame:
@@ -161,7 +163,8 @@ def over_scenes(table: pd.DataFrame) -> pd.DataFrame:
         low, high = wilson_interval(int(holds.sum()), max(len(holds), 1))
         own = [holds[(tested["family"] == family).to_numpy()] for family in families]
         sizes, held = [len(each) for each in own], [int(each.sum()) for each in own]
-        row = {"claim": claim, "n_scenes": len(holds), "n_holds": sum(held)}
+        same = len(holds) >= _FEWEST and tested["value"].nunique() == 1
+        row = {"claim": claim, "same": same, "n_scenes": len(holds), "n_holds": sum(held)}
         row |= dict.fromkeys(("share", "low", "high", "p_families"), np.nan)
         if len(holds):
             row |= {"share": holds.mean(), "low": float(low), "high": float(high)}
@@ -172,7 +175,7 @@ def over_scenes(table: pd.DataFrame) -> pd.DataFrame:
     found = pd.DataFrame(rows)
     found["p_families"] = holm(found["p_families"].to_numpy(dtype=np.float64))
     found.insert(1, "kind", [_kind(row) for row in found.to_dict("records")])
-    return found
+    return found.drop(columns="same")
 
 
 def by_family(found: pd.DataFrame) -> pd.DataFrame:
@@ -205,6 +208,8 @@ def by_family(found: pd.DataFrame) -> pd.DataFrame:
 def _kind(row: Mapping[Any, Any]) -> str:
     if not row["n_scenes"]:
         return NOWHERE
+    if row["same"]:
+        return NO_SCENE
     if row["low"] > _HOLDS:
         return GENERAL
     if row["high"] < _FAILS:
