@@ -238,6 +238,8 @@ TOGETHER: dict[str, dict[str, Any]] = {
     "sets.examples.n_views": {"n_views": 2, "blur": [0.5, 1.0], "step": [20, 14]},
     "sets.blur_errors.n_views": {"n_views": 2, "blur": [0.7, 0.3]},
     "sets.shots.n_views": {"n_views": 2, "blur": [0.8, 0.5]},
+    "sets.tilts.n_views": {"n_views": 2, "tilt": [0, 5], "azimuth": [0, 10]},
+    "sets.blur_zooms.n_views": {"n_views": 2, "step": [5, 6.25]},
 }
 """Settings that others of their block must follow."""
 
