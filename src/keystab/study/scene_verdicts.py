@@ -28,14 +28,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.stats import multivariate_hypergeom
 
 from keystab.errors import InputError
 from keystab.evaluation.intervals import wilson_interval
+from keystab.study.decisions import holm
 from keystab.study.verdicts import REPRODUCED, UNTESTED
 
-__all__ = ["GENERAL", "KINDS", "by_family", "families_differ", "holm", "long_table", "over_scenes"]
+__all__ = ["GENERAL", "KINDS", "by_family", "families_differ", "long_table", "over_scenes"]
 
 GENERAL, GENERALLY_NOT, DEPENDS, UNDECIDED, NO_SCENE, NOWHERE = (
     "general", "generally not", "scene-dependent", "undecided", "of no scene", "not testable",
@@ -86,31 +86,6 @@ def long_table(reports: Mapping[str, pd.DataFrame], families: Mapping[str, str])
     whole = pd.concat(parts, ignore_index=True)
     whole = whole.iloc[np.argsort(whole["claim"].map(order).to_numpy(), kind="stable")]
     return whole[["claim", "scene", "family", "verdict", "value"]].reset_index(drop=True)
-
-
-def holm(p_values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """P-values corrected for many tests by Holm's step-down method.
-
-    Parameters
-    ----------
-    p_values : ndarray of float64, shape (n,)
-        NaN where nothing was tested; stays NaN and does not count.
-
-    Returns
-    -------
-    ndarray of float64, shape (n,)
-
-    Examples
-    --------
-    >>> holm(np.array([0.01, 0.04, 0.03, np.nan])).round(3).tolist()
-    [0.03, 0.06, 0.06, nan]
-    """
-    corrected = np.full(p_values.shape, np.nan)
-    tested = np.flatnonzero(np.isfinite(p_values))
-    order = tested[np.argsort(p_values[tested], kind="stable")]
-    times = np.arange(order.size, 0, -1)
-    corrected[order] = np.minimum(np.maximum.accumulate(p_values[order] * times), 1.0)
-    return corrected
 
 
 def families_differ(sizes: Sequence[int], held: Sequence[int]) -> float:
@@ -173,7 +148,8 @@ def over_scenes(table: pd.DataFrame) -> pd.DataFrame:
             row |= {f"{family}_n": n, f"{family}_holds": k}
         rows.append(row)
     found = pd.DataFrame(rows)
-    found["p_families"] = holm(found["p_families"].to_numpy(dtype=np.float64))
+    tested = found["p_families"].notna()
+    found.loc[tested, "p_families"] = holm(found.loc[tested, "p_families"].tolist())
     found.insert(1, "kind", [_kind(row) for row in found.to_dict("records")])
     return found.drop(columns="same")
 
