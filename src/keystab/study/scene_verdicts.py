@@ -148,8 +148,8 @@ def over_scenes(table: pd.DataFrame) -> pd.DataFrame:
             row |= {f"{family}_n": n, f"{family}_holds": k}
         rows.append(row)
     found = pd.DataFrame(rows)
-    tested = found["p_families"].notna()
-    found.loc[tested, "p_families"] = holm(found.loc[tested, "p_families"].tolist())
+    known = found["p_families"].notna()
+    found.loc[known, "p_families"] = holm(found.loc[known, "p_families"].tolist())
     found.insert(1, "kind", [_kind(row) for row in found.to_dict("records")])
     return found.drop(columns="same")
 
