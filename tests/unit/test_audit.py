@@ -27,7 +27,6 @@ from keystab.audit.conditions import (
     condition_of,
     made_picture,
     scene_of,
-    spread_points,
     views_of,
 )
 from keystab.audit.controls import CONTROLS
@@ -35,6 +34,7 @@ from keystab.audit.detectors import DETECTORS, FINE, Detector, chosen, own_detec
 from keystab.audit.isolation import Limits, detections
 from keystab.audit.measures import measured
 from keystab.audit.page import findings, page
+from keystab.audit.phases import even_phases, spread_points
 from keystab.audit.run import (
     COLUMNS,
     Audit,

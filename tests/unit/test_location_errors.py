@@ -185,7 +185,7 @@ def test_no_seam_is_measured_where_there_is_none():
         (0.25, "xy", 2.0, "0.25 xy diameter"),
         (0.5, "yx", 2**0.5, "0.5 yx radius"),
         (1.0, "xy", 8**0.5, "1 xy blob diameter"),
-        (0.12, "yx", 1.2, "(0.12, 0.12) yx 1.20 sigma"),
+        (0.12, "yx", 1.2, "(0.12, 0.12) yx 1.2 sigma"),
     ],
 )
 def test_conventions_are_found_beneath_noise_and_other_keypoints(origin, order, factor, said):
