@@ -379,9 +379,9 @@ def blobs(plan: AuditPlan) -> Condition:
     views = []
     n = plan.blobs
     for number, size in enumerate(_SIZES):
-        apart = math.ceil(_APART * size) + PERIOD
+        apart = PERIOD * (math.ceil(_APART * size / PERIOD) + 1)
         grid = np.moveaxis(np.mgrid[1 : n + 1, 1 : n + 1], 0, -1).reshape(-1, 2) * apart
-        centres = grid + even_phases(n * n, number)
+        centres = grid + even_phases(n, number)
         side = (n + 1) * apart + PERIOD
         variance = size**2 + BLUR**2
         pixels = np.arange(side)

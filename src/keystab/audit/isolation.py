@@ -189,12 +189,12 @@ class _Time:
         allowed = self._allowed
         if clock <= allowed:
             return ""  # one thread takes no more of the processor, and it should have one
-        if clock > self._patience * allowed:
+        if self._patience > 1 and clock > self._patience * allowed:
             return f"it took more than {self._patience * allowed:g} s by the clock"
         if clock - self._asked < min(0.5, allowed / 4):
             return ""  # asking costs milliseconds
         self._asked = clock
-        used = _processor_seconds(self._pid)
+        used = _processor_seconds(self._pid) if self._patience > 1 else None
         short = self._used is not None and used is not None and used - self._used <= allowed
         return "" if short else f"it took more than {allowed:g} s"
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,34 +13,35 @@ PERIOD = 4
 _GOLDEN = 1.32471795724474602596  # the plastic number: its powers spread points evenly
 
 
-def even_phases(count: int, number: int) -> NDArray[np.float64]:
+def even_phases(n: int, number: int) -> NDArray[np.float64]:
     """Places within four pixels in y and x, as many in every part of a pixel.
 
     Parameters
     ----------
-    count : int
-        How many: a square number.
+    n : int
+        They belong to n rows of n blobs.
     number : int
         0, 1 or 2: three sets, of which each fills the gaps of the others.
 
     Returns
     -------
-    ndarray of float64, shape (count, 2)
-        In [0, 4). Sorted, the fractions are regular, and with each one comes its opposite; so a
-        detector that rounds to samples half a pixel, 1, 2 or 4 pixels apart has no bias. What
-        follows one another lies far apart, as in an additive recurrence.
+    ndarray of float64, shape (n * n, 2)
+        In [0, 4), row by row. Sorted, the fractions are regular, and with each one comes its
+        opposite; so a detector that rounds to samples half a pixel, 1, 2 or 4 pixels apart has no
+        bias. Neither y and x nor phases and rows or columns go together (a lattice).
 
     Examples
     --------
-    >>> places = even_phases(100, 1)
+    >>> places = even_phases(10, 1)
     >>> np.histogram(places[:, 0] % 1, 5, (0, 1))[0].tolist()
     [20, 20, 20, 20, 20]
     >>> print(np.abs((places - np.round(places)).mean(axis=0)).round(9))
     [0. 0.]
     """
-    odd = count % 2
-    steps = [_coprime(count / _GOLDEN, count), _coprime(count / _GOLDEN**2, count)]
-    steps = [steps, steps[::-1], [steps[0], -steps[1]]][number % 3]
+    count, odd = n * n, n % 2
+    # A row moves them by some n-th of a pixel, a column by another: steps of u n + 1 or u n - 1,
+    # which have no divisor in common with n * n.
+    steps = ((4 * n + 1, 3 * n - 1), (2 * n + 1, 4 * n + 1), (4 * n + 1, 4 * n - 1))[number % 3]
     ranks = np.arange(count)[:, None] * np.array(steps) % count
     # Fractions rank / count, or those in the middle between: none is half of a pixel, from which
     # rounding goes either way. Those of two sets are moved by a third, outwards or inwards.
@@ -54,12 +53,6 @@ def even_phases(count: int, number: int) -> NDArray[np.float64]:
     second = first + (first + 3 * odd) // 4
     found: NDArray[np.float64] = np.stack([first, second], axis=1) % PERIOD + fractions
     return found
-
-
-def _coprime(value: float, number: int) -> int:
-    """Whole number near a value, with no divisor in common with another number."""
-    near = sorted(range(1, number + 1), key=lambda each: abs(each - value))
-    return next(each for each in near if math.gcd(each, number) == 1)
 
 
 def spread_points(n: int) -> NDArray[np.float64]:
