@@ -35,6 +35,8 @@ TABLES = {
 
 BLOBS, SCENE, TURNED, NOISY = "blobs", "translations", "rotation 90", "noise 0.03"
 
+_CLEAR = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}  # of lines beneath
+
 FARTHEST = 0.35
 """Pixels at which panels a and b end; what lies beyond stands there as a number."""
 
@@ -126,6 +128,7 @@ def _end_at(ax: Axes, values: list[NDArray[np.float64]], colours: Sequence[str])
             ax.annotate(
                 ", ".join(dict.fromkeys(numbers)), (side * FARTHEST, row), (-side * 4, 0),
                 textcoords="offset points", ha=align, va="center_baseline", fontsize=style.SMALL,
+                bbox=_CLEAR,
             )  # fmt: skip
 
 
@@ -141,6 +144,7 @@ def _say_why(ax: Axes, problems: list[object]) -> None:
         ax.text(
             0.5, row, "failed" if failed else "too few", transform=ax.get_yaxis_transform(),
             color=palette.GREY, fontsize=style.SMALL, ha="center", va="center_baseline",
+            bbox=_CLEAR,
         )  # fmt: skip
 
 
