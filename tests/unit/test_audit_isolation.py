@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from keystab.audit.detectors import own_detector
+from keystab.audit.detectors import Detector, own_detector
 from keystab.audit.isolation import Limits, detections, why_not_there
 from keystab.cli.main import main
 
@@ -27,6 +27,10 @@ def slow(image, blur):
 def busy(image, blur):
     end = time.process_time() + 100
     while time.process_time() < end: pass
+
+def late(image, blur):
+    while len(image) == 20 and time.process_time() < 0.6: pass
+    return [[1.0, 2.0, 3.0]]
 
 def family(image, blur):
     subprocess.run([sys.executable, "-c", "while True: pass"])
@@ -68,6 +72,24 @@ def test_time_of_which_a_detector_has_nothing_is_not_counted(here):
 def test_time_of_the_processor_is_counted_in_all_processes(name, here):
     said = problem_of(name, Limits(0.3, patience=100.0))
     assert said == "it took more than 0.3 s for a picture (--time-limit)"
+
+
+@LINUX
+def test_a_library_may_compile_with_a_later_picture(here):
+    pictures, limits = ([IMAGE, SMALL], [0.5, 0.5]), Limits(0.15, start=5.0)
+    own = own_detector("mine:late")
+    said = [each.problem for each in detections(own, *pictures, limits)]
+    assert said == ["", "it took more than 0.15 s for a picture (--time-limit)"]
+    library = Library(own.name, own.setting, "library", own.runs)
+    assert [each.problem for each in detections(library, *pictures, limits)] == ["", ""]
+
+
+class Library(Detector):
+    """A function that counts as a library."""
+
+    @property
+    def job(self):
+        return {**super().job, "kind": "function"}
 
 
 def test_what_waits_is_ended_by_the_clock(here):

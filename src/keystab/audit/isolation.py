@@ -54,8 +54,8 @@ class Limits:
         Of the processor for one picture, for all processes that it started together; by the clock
         where the processor's time is not known.
     start : float
-        The same until the detector is there, and more seconds for the first picture of a
-        library's, which may compile its code.
+        The same until the detector is there, and more seconds for the pictures of a library's
+        together, of which the first may compile its code, and another the rest of it.
     output : int
         Bytes that it may print, for all pictures together.
     patience : float
@@ -194,9 +194,15 @@ class _Time:
         if clock - self._asked < min(0.5, allowed / 4):
             return ""  # asking costs milliseconds
         self._asked = clock
-        used = _processor_seconds(self._pid) if self._patience > 1 else None
-        short = self._used is not None and used is not None and used - self._used <= allowed
-        return "" if short else f"it took more than {allowed:g} s"
+        over = self._patience <= 1 or self.taken() > allowed
+        return f"it took more than {allowed:g} s" if over else ""
+
+    def taken(self) -> float:
+        """Seconds of the processor, where these are known, and no more than by the clock."""
+        clock, used = time.monotonic() - self._since, _processor_seconds(self._pid)
+        if self._used is None or used is None:
+            return clock
+        return min(clock, max(0.0, used - self._used))
 
 
 def _processor_seconds(session: int) -> float | None:
@@ -262,21 +268,23 @@ def _answers(
             if number == 0 and not version and started.exists():
                 version = one_line(str(_read_json(started).get("version", ""))) or " "
                 taken.restart(limits.seconds + more)
+            there = bool(version) or number > 0
             if said.too_much:
                 problem = f"it printed more than {limits.output} bytes"
             elif over and not (found.exists() or failed.exists()):
                 said.thread.join(timeout=1.0)
                 problem = _how_it_ended(process.returncode, said.last_line())
             elif problem := taken.problem():
-                problem += " for a picture (--time-limit)" if version else " to start"
+                problem += " for a picture (--time-limit)" if there else " to start"
             if problem:
-                not_there = over and not version
+                not_there = over and not there
                 for _ in range(number, len(images)):
                     yield Found(None, math.nan, problem, version.strip(), True, not_there)
                 return
             time.sleep(_POLL)
         version = version or one_line(str(_read_json(started).get("version", "")))
-        taken.restart(limits.seconds)
+        more -= min(more, max(0.0, taken.taken() - limits.seconds))
+        taken.restart(limits.seconds + more)
         if failed.exists():
             about = _read_json(failed)
             problem = str(about.get("problem", "it failed"))
