@@ -571,6 +571,20 @@ def test_drifts_are_said_of_detectors_that_drift():
     assert "drifts" not in said[1.0] and "The error in y drifts by +0." in said[1.002]
 
 
+def test_a_drift_of_the_scene_alone_is_not_said(controls):
+    table = rows(controls, "truth").copy()
+    scene = table["condition"] == "translations"
+    ends = ["drift_x", "drift_x_low", "drift_x_high"]
+    table.loc[scene, ends] = [-0.7, -1.0, -0.4]
+    assert "drifts" not in "\n".join(findings(table))
+    table.loc[table["condition"] == "blobs", ends] = [-0.04, -0.05, -0.03]
+    said = [line for line in findings(table) if "drifts" in line]
+    line = "The error in x drifts by -0.700 px (-1.000 to -0.400) from left to right on the scene."
+    assert said == [line]
+    table.loc[table["condition"] == "blobs", ends[1:]] = np.nan
+    assert line in findings(table)
+
+
 def laplacian_maxima(image):
     """Maxima of the Laplacian of Gaussians, which knows of no place in the picture."""
     sigma = 1.2 * 2 ** (np.arange(10) / 3)

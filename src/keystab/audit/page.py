@@ -103,6 +103,7 @@ def findings(rows: pd.DataFrame) -> list[str]:
     for name, where in ((BLOBS, "on blobs"), (PHOTOGRAPH, "on the scene")):
         if name in measured:
             lines += _places(measured[name], where)
+            lines += _drifts(measured[name], where, measured.get(BLOBS))
     if PHOTOGRAPH in measured:
         lines += _amounts(measured[PHOTOGRAPH])
     lines += _agreement(measured)
@@ -165,9 +166,16 @@ def _places(row: _Row, where: str) -> Iterable[str]:
         way = "large" if row["scale_bias"] > 0 else "small"
         ends = f"({100 * row['scale_bias_low']:+.1f} to {100 * row['scale_bias_high']:+.1f})"
         yield f"Scales {where} are {abs(100 * row['scale_bias']):.1f} % too {way} {ends}."
+
+
+def _drifts(row: _Row, where: str, blobs: _Row | None) -> Iterable[str]:
+    """Drifts; on a scene, whose extrema are few and no two alike, those that blobs show too."""
     for axis, way in (("y", "top to bottom"), ("x", "left to right")):
         low, high = row[f"drift_{axis}_low"], row[f"drift_{axis}_high"]
-        if low > _MUCH_DRIFT or high < -_MUCH_DRIFT:
+        least, most = low, high
+        if blobs is not None and _has_interval(blobs, f"drift_{axis}"):
+            least, most = blobs[f"drift_{axis}_low"], blobs[f"drift_{axis}_high"]
+        if (low > _MUCH_DRIFT and least > 0) or (high < -_MUCH_DRIFT and most < 0):
             yield f"The error in {axis} drifts by {_px(row, f'drift_{axis}')} from {way} {where}."
 
 
