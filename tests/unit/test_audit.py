@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import ndimage
 
 from keystab.audit.conditions import (
     BLUR,
@@ -20,6 +21,7 @@ from keystab.audit.conditions import (
     KAPPA,
     LOW,
     PLAN,
+    QUICK,
     SPAN,
     STEP,
     Stage,
@@ -27,14 +29,14 @@ from keystab.audit.conditions import (
     condition_of,
     made_picture,
     scene_of,
-    spread_points,
     views_of,
 )
 from keystab.audit.controls import CONTROLS
 from keystab.audit.detectors import DETECTORS, FINE, Detector, chosen, own_detector
-from keystab.audit.isolation import Limits, detections
+from keystab.audit.isolation import Found, Limits, detections
 from keystab.audit.measures import measured
-from keystab.audit.page import findings, page
+from keystab.audit.page import as_table, findings, page
+from keystab.audit.phases import even_phases, spread_points
 from keystab.audit.run import (
     COLUMNS,
     Audit,
@@ -109,6 +111,45 @@ def test_there_are_a_hundred_blobs_of_each_size_of_all_phases():
         y, x = np.round(view.truth.iloc[7][["y", "x"]]).astype(int)
         assert view.image[y, x] > 0.7 and view.image.min() >= 0 and view.image.max() <= 1
         assert view.truth["sigma"].between(LOW, HIGH).all()
+
+
+@pytest.mark.parametrize("plan", [PLAN, QUICK], ids=["plan", "quick"])
+def test_phases_are_even_and_others_for_each_size(plan):
+    n = plan.blobs
+    sets = [view.truth[["y", "x"]].to_numpy() % 4 for view in blobs(plan).views]
+    np.testing.assert_allclose(sets[1], even_phases(n, 1), atol=1e-9)
+    grid = np.mgrid[:n, :n].reshape(2, -1)
+    for places in sets:
+        for values in places.T:
+            assert np.ptp(np.histogram(values % 1, 10, (0, 1))[0]) <= 2
+            assert np.ptp(np.histogram(values, 4, (0, 4))[0]) <= 1
+            for step in (0.5, 1, 2, 4):
+                assert abs(np.mean(values - step * np.round(values / step))) < 1e-3
+        for step in (1, 2, 4):
+            left = (places - step * np.round(places / step)).T
+            assert np.abs(np.corrcoef(left)[0, 1]) < 0.1
+            assert np.abs(np.corrcoef(left, grid)[:2, 2:]).max() < 0.11
+    for first, second in ((0, 1), (1, 2), (0, 2)):
+        both = np.intersect1d(*(np.round(sets[k][:, 0] % 1, 6) for k in (first, second)))
+        assert len(both) <= 1
+
+
+@pytest.mark.parametrize("plan", [PLAN, QUICK], ids=["plan", "quick"])
+@pytest.mark.parametrize("step", [1, 2])
+def test_a_detector_that_rounds_has_no_bias_and_no_drift(plan, step):
+    condition = blobs(plan)
+    for view in condition.views:
+        apart = np.diff(np.sort(view.truth["x"].to_numpy().reshape(plan.blobs, -1)))
+        assert apart.min() >= 7 * view.truth["sigma"].iloc[0]
+    columns = [
+        (step * np.round(view.truth[["y", "x"]] / step)).assign(scale=view.truth["sigma"])
+        for view in condition.views
+    ]
+    row = measured(condition, columns, KEYSTAB).row
+    assert abs(row["bias_y"]) < 0.01 and abs(row["bias_x"]) < 0.01 and row["recall"] == 1.0
+    assert row["phase_pattern"] == "no offsets" and row["phase_step"] == step
+    for axis in "yx":
+        assert row[f"drift_{axis}_low"] < 0 < row[f"drift_{axis}_high"]
 
 
 def test_views_of_all_conditions_see_the_same_scene(stage):
@@ -193,7 +234,7 @@ def test_a_shift_is_a_bias_and_a_convention_and_parts_views_that_turn(controls):
 
 def test_swapped_offsets_are_found_though_there_is_no_bias(controls):
     row = rows(controls, "swapped offsets", "blobs")
-    assert abs(row["bias_y"]) < 0.06 and row["bias_y_low"] < 0 < row["bias_y_high"]
+    assert abs(row["bias_y"]) < 0.01 and row["bias_y_low"] < 0 < row["bias_y_high"]
     assert row["phase_pattern"] == "swapped offsets" and row["phase_step"] == 1.0
     matrix = [row[f"phase_{name}"] for name in ("yy", "yx", "xy", "xx")]
     np.testing.assert_allclose(matrix, [-1, 1, 1, -1], atol=1e-9)
@@ -431,13 +472,13 @@ def test_a_command_gets_a_picture_and_gives_a_table(here):
         ("open(sys.argv[2], 'w').write('y,x,sigma\\n1,2,three\\n')", "ValueError: row 1 of its table holds no numbers"),
         ("open(sys.argv[2], 'w').write('y,x,sigma\\n1,nan,3\\n')", "1 of 1 keypoints are at NaN"),
         ("import os; os.kill(os.getpid(), 11)", "it was ended by signal 11"),
-        ("import time; time.sleep(100)", "it took more than 1 s"),
+        ("import time; time.sleep(100)", "it took more than 1 s for a picture"),
     ],
 )  # fmt: skip
 def test_a_wrong_command_is_one_clear_line(code, said, here):
     Path("mine.py").write_text(f"import sys\n{code}\n")
     detector = own_detector(f"{sys.executable} mine.py {{picture}} {{table}}")
-    (found,) = detections(detector, [IMAGE], [0.5], Limits(1.0))
+    (found,) = detections(detector, [IMAGE], [0.5], Limits(1.0, patience=1.0))
     assert found.problem.startswith(said) and found.keypoints is None
 
 
@@ -479,8 +520,87 @@ def test_findings_say_what_is_wrong_and_what_is_not(controls):
     assert "**The sub-pixel offsets of y and x are swapped** on blobs" in swapped
     right = "\n".join(findings(rows(controls, "truth")))
     assert "No bias on blobs" in right and "**" not in right
-    failed = rows(controls, "truth").assign(problem="it was ended", recall=np.nan)
-    assert findings(failed)[1] == "**It was ended**."
+    failed = rows(controls, "truth").assign(problem="it was ended", recall=np.nan, version="1.2")
+    assert findings(failed) == ["Version 1.2.", "**It was ended**."]
+    assert findings(failed.assign(version="")) == ["**It was ended**."]
+
+
+def test_swapped_axes_are_said_first_and_nothing_of_chance(stage):
+    conditions = [condition_of(name, SMALL, stage) for name in ("blobs", "translations")]
+    found = [
+        [
+            Found(view.truth.rename(columns={"y": "x", "x": "y", "sigma": "scale"}), 0.1, "", "")
+            for view in condition.views
+        ]
+        for condition in conditions
+    ]
+    tables = Audit(conditions).rows(own_detector("mine:detect"), found=found)
+    table = with_conventions(tables.audit)
+    first, *others = findings(table)
+    assert first.startswith("**Its axes are swapped: audit again with `--convention 0,xy,sigma`**")
+    assert others == ["It says `0 yx sigma`, and on blobs `0 xy sigma` was found."]
+    assert (
+        as_table(table)
+        .splitlines()[-1]
+        .startswith("| mine:detect | as given | 0 xy sigma |  |  | ")
+    )
+
+
+def test_no_number_is_said_without_its_interval():
+    few = BLOBS.views[0].truth.rename(columns={"sigma": "scale"}).head(3)
+    columns = [few.assign(y=few["y"] + 0.3, scale=1.277 * few["scale"]), few.head(0), few.head(0)]
+    found = [[Found(each, 0.1, "", "") for each in columns]]
+    table = Audit([BLOBS]).rows(own_detector("mine:detect"), found=found).audit
+    assert table["scale_bias"][0] == pytest.approx(0.277)
+    text = "\n".join(findings(table))
+    assert "Too few of those on blobs are found to say how far off they are." in text
+    assert "Scales" not in text and "bias" not in text.lower() and "nan" not in text
+    assert "+0.300" not in as_table(table)
+
+
+def test_drifts_are_said_of_detectors_that_drift():
+    said = {}
+    for zoom in (1.0, 1.002):
+        columns = []
+        for view in BLOBS.views:
+            found = pd.DataFrame(laplacian_maxima(view.image), columns=["y", "x", "scale"])
+            columns.append(Found(found.assign(y=zoom * found["y"]), 0.1, "", ""))
+        table = Audit([BLOBS]).rows(own_detector("mine:detect"), found=[columns]).audit
+        assert table["recall"][0] > 0.9
+        said[zoom] = "\n".join(findings(table))
+    assert "drifts" not in said[1.0] and "The error in y drifts by +0." in said[1.002]
+
+
+def test_a_drift_of_the_scene_alone_is_not_said(controls):
+    table = rows(controls, "truth").copy()
+    scene = table["condition"] == "translations"
+    ends = ["drift_x", "drift_x_low", "drift_x_high"]
+    table.loc[scene, ends] = [-0.7, -1.0, -0.4]
+    assert "drifts" not in "\n".join(findings(table))
+    table.loc[table["condition"] == "blobs", ends] = [-0.04, -0.05, -0.03]
+    said = [line for line in findings(table) if "drifts" in line]
+    line = "The error in x drifts by -0.700 px (-1.000 to -0.400) from left to right on the scene."
+    assert said == [line]
+    table.loc[table["condition"] == "blobs", ends[1:]] = np.nan
+    assert line in findings(table)
+
+
+def laplacian_maxima(image):
+    """Maxima of the Laplacian of Gaussians, which knows of no place in the picture."""
+    sigma = 1.2 * 2 ** (np.arange(10) / 3)
+    stack = np.array([-(s**2) * ndimage.gaussian_laplace(image, s, truncate=3.0) for s in sigma])
+    k, y, x = np.nonzero((stack == ndimage.maximum_filter(stack, 3)) & (stack > 0.05))
+    k, y, x = (each[(k > 0) & (k < len(sigma) - 1)] for each in (k, y, x))
+    return np.stack([y, x, sigma[k] / math.sqrt(KAPPA)], axis=1)
+
+
+def test_an_extremum_has_one_number_in_all_views(stage):
+    condition = condition_of("translations", SMALL, stage)
+    columns = [view.truth.rename(columns={"sigma": "scale"}) for view in condition.views]
+    row = measured(condition, columns, KEYSTAB).row
+    different = {each for view in condition.views for each in view.extremum[view.wanted]}
+    assert len(different) < sum(view.wanted.sum() for view in condition.views) / 2
+    assert row["drift_y"] == 0.0 and math.isnan(row["drift_y_low"])  # fewer than 30
 
 
 def test_the_page_has_every_detector_and_the_command(controls):
@@ -557,3 +677,38 @@ def test_the_figure_draws_every_setting_where_its_numbers_are(controls):
     assert found["recall"].get_xdata()[0] == 100.0
     with pytest.raises(InputError, match=r"audit\.csv: lacks the column"):
         draw({"audit": controls.audit[["detector"]], "audit_octaves": controls.octaves})
+
+
+def test_the_figure_says_what_lies_beyond_and_what_failed(controls):
+    from keystab.figures.audit import FARTHEST, draw
+
+    names = list(CONTROLS)
+    audit, octaves = controls.audit.copy(), controls.octaves.copy()
+    ends = ["", "_low", "_high"]
+    far = [f"bias_{axis}{end}" for axis in "yx" for end in ends]
+    audit.loc[audit["setting"] == names[1], far] += [0.25] * 3 + [-1.25] * 3
+    octaves.loc[octaves["setting"] == names[1], far[:3]] += 0.25
+    failed = audit["setting"] == names[2]
+    numbers = audit.select_dtypes("number").columns
+    audit.loc[failed, numbers] = np.nan
+    audit.loc[failed, "problem"] = "it was ended"
+    octaves = octaves[octaves["setting"] != names[2]]
+    figure = draw({"audit": audit, "audit_octaves": octaves})
+    axes = {ax.get_label(): ax for ax in figure.axes}
+    arrows = [line for line in axes["a"].lines if line.get_label() == "beyond"]
+    places = {
+        (line.get_marker(), float(x), round(float(y)))
+        for line in arrows
+        for x, y in zip(*line.get_data(), strict=True)
+    }
+    assert places == {(">", 0.96 * FARTHEST, 1), ("<", -0.96 * FARTHEST, 1)}
+    texts = {letter: [each.get_text() for each in ax.texts] for letter, ax in axes.items()}
+    assert {"+0.50", "-1.00"} <= {*texts["a"]} and "+0.50" in texts["b"]
+    for letter in "abcde":
+        assert texts[letter].count("failed") == 1
+    assert "too few" in texts["a"]  # random points have no bias
+    assert axes["e"].get_title(loc="left").endswith("1 px")
+    turned = audit[audit["condition"] == "rotation 90"].set_index("setting")
+    dots = axes["e"].lines[0].get_xdata()
+    assert dots[0] == 100 * turned.loc[names[0], "repeatability_1"]
+    assert dots[3] == 100 * turned.loc[names[3], "repeatability_1"]

@@ -102,6 +102,35 @@ def test_drifts_are_those_of_a_wrong_zoom():
     assert math.isnan(drift(errors[:2], p[:2], (100.0, 100.0))[0].value)
 
 
+def test_drifts_of_few_extrema_in_many_views_have_wide_intervals():
+    # An extremum has the same error in eight views, as have those that are no extremum.
+    held, naive = 0, 0
+    extent = (100.0, 100.0)
+    for seed in range(200):
+        own = draw(20, seed)
+        p = np.repeat(own.uniform(0, 100, (40, 2)), 8, axis=0)
+        false = own.random((40, 1)) < 0.3
+        errors = np.where(false, own.uniform(-1, 1, (40, 2)), own.normal(0, 0.1, (40, 2)))
+        errors = np.repeat(errors, 8, axis=0)
+        found = drift(errors, p, extent, np.repeat(np.arange(40), 8), 0.5)[0]
+        held += not (found.low > 0 or found.high < 0)  # nothing is said of fewer than 30
+        found = drift(errors, p, extent)[0]
+        naive += found.low <= 0 <= found.high
+    assert held >= 182 and naive < 150
+
+
+def test_a_drift_is_found_though_there_are_false_matches():
+    p = points(300, 21)
+    errors = 0.005 * p + draw(22).normal(0, 0.05, p.shape) - 0.25
+    errors[:60] = draw(23).uniform(-1, 1, (60, 2))
+    for found in drift(errors, p, (100.0, 100.0), np.arange(300) // 2, 0.5):
+        assert 0.4 < found.value < 0.51 and found.low > 0.35  # they flatten it somewhat
+    for found in drift(errors, p, (100.0, 100.0), np.arange(300) % 29, 0.5):
+        assert math.isnan(found.low) and not math.isnan(
+            found.value
+        )  # of 29 extrema nothing is said
+
+
 def test_ellipses_hold_what_their_covariance_says():
     covariance = np.array([[0.04, 0.018], [0.018, 0.01]])
     errors = draw(9).multivariate_normal([0, 0], covariance, 4000)
@@ -185,7 +214,8 @@ def test_no_seam_is_measured_where_there_is_none():
         (0.25, "xy", 2.0, "0.25 xy diameter"),
         (0.5, "yx", 2**0.5, "0.5 yx radius"),
         (1.0, "xy", 8**0.5, "1 xy blob diameter"),
-        (0.12, "yx", 1.2, "(0.12, 0.12) yx 1.20 sigma"),
+        (0.0, "yx", 4.0, "0 yx 4 sigma"),
+        (0.12, "yx", 1.2, "(0.12, 0.12) yx 1.2 sigma"),
     ],
 )
 def test_conventions_are_found_beneath_noise_and_other_keypoints(origin, order, factor, said):

@@ -2,8 +2,8 @@ r"""What detectors are shown, and what they should find there.
 
 A *scene* is a picture of known pixels, seen by the simulated camera: its views differ by known
 shifts, zooms, rotations, blur and noise, and its true extrema, computed once, are known in each.
-*Blobs* are Gaussians at known places, evenly spread over all sub-pixel phases and far enough apart
-not to disturb one another; what should be found of each has a closed form, s / sqrt(kappa).
+*Blobs* are Gaussians at known places, as many at every sub-pixel phase and far enough apart not to
+disturb one another; what should be found of each has a closed form, s / sqrt(kappa).
 
 All scales are in pixels of the view. `LOW` to `HIGH` are compared; what is known reaches `KNOWN`
 times farther on both sides, so that nothing at the ends is without a partner.
@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from keystab.audit.phases import PERIOD, even_phases, spread_points
 from keystab.camera.made_scenes import make_scene
 from keystab.camera.simulation import Scene, simulate, simulate_view
 from keystab.camera.views import ViewSpec, to_reference, to_view
@@ -65,7 +66,6 @@ SPAN = 1.7
 
 _SIZES, _APART = (1.6, 2.8, 5.0), 7.0
 _GREY, _HEIGHT = 0.2, 0.6
-_GOLDEN = 1.32471795724474602596  # the plastic number: its powers spread points evenly
 
 
 BLOBS = "blobs"
@@ -95,6 +95,9 @@ class View:
         What of it is compared.
     spec : ViewSpec or None
         How the view was taken; None for blobs.
+    extremum : ndarray of int, optional
+        Which extremum of the scene each row of the truth is: the same number in every view. None
+        where no two rows of any views are the same.
     """
 
     image: NDArray[np.float64]
@@ -102,6 +105,7 @@ class View:
     truth: pd.DataFrame
     wanted: NDArray[np.bool_]
     spec: ViewSpec | None
+    extremum: NDArray[np.intp] | None = None
 
     @cached_property
     def _levels(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -188,7 +192,8 @@ class Stage:
         truth = pd.DataFrame({"y": y, "x": x, "sigma": sigma})[seen].reset_index(drop=True)
         wanted = truth["sigma"].between(LOW, HIGH).to_numpy()
         wanted = wanted & self.compared(spec, truth["y"].to_numpy(), truth["x"].to_numpy())
-        return View(simulate(self.scene, spec), spec.blur, truth, wanted, spec)
+        image = simulate(self.scene, spec)
+        return View(image, spec.blur, truth, wanted, spec, np.flatnonzero(seen))
 
 
 def scene_of(picture: NDArray[np.float64], plan: AuditPlan) -> NDArray[np.float64]:
@@ -367,18 +372,17 @@ def condition_of(name: str, plan: AuditPlan, stage: Stage | None) -> Condition:
 def blobs(plan: AuditPlan) -> Condition:
     """Pictures of isolated blobs, one for each of three sizes, an octave apart or nearly.
 
-    Each blob's neighbours are seven of its standard deviations away, and change where it is by less
-    than 1e-3 pixels; its phase is spread over four pixels, so that samples up to two pixels apart
-    are met evenly.
+    Each blob's neighbours are at least seven of its standard deviations away, and change where it
+    is by less than 1e-3 pixels. Phases are even over four pixels, so that samples up to four pixels
+    apart are met evenly, and others for each size; see `even_phases`.
     """
     views = []
-    for size in _SIZES:
-        apart = math.ceil(_APART * size)
-        n = plan.blobs
-        phases = 4 * spread_points(n * n).reshape(n, n, 2)
-        grid = np.moveaxis(np.mgrid[1 : n + 1, 1 : n + 1], 0, -1) * apart
-        centres = (grid + phases).reshape(-1, 2)
-        side = (n + 1) * apart + 4
+    n = plan.blobs
+    for number, size in enumerate(_SIZES):
+        apart = PERIOD * (math.ceil(_APART * size / PERIOD) + 1)
+        grid = np.moveaxis(np.mgrid[1 : n + 1, 1 : n + 1], 0, -1).reshape(-1, 2) * apart
+        centres = grid + even_phases(n, number)
+        side = (n + 1) * apart + PERIOD
         variance = size**2 + BLUR**2
         pixels = np.arange(side)
         rows, columns = (
@@ -391,16 +395,3 @@ def blobs(plan: AuditPlan) -> Condition:
         )
         views.append(View(image, BLUR, truth, np.ones(len(truth), dtype=bool), None))
     return Condition(BLOBS, views, None)
-
-
-def spread_points(n: int) -> NDArray[np.float64]:
-    """Points in the unit square, spread more evenly than by chance: an additive recurrence.
-
-    Examples
-    --------
-    >>> spread_points(1000).mean(axis=0).round(2).tolist()
-    [0.5, 0.5]
-    """
-    steps = np.array([1 / _GOLDEN, 1 / _GOLDEN**2])
-    points: NDArray[np.float64] = (0.5 + np.arange(1, n + 1)[:, None] * steps) % 1.0
-    return points

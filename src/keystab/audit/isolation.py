@@ -2,10 +2,14 @@
 
 A detector may crash, hang, fill the disk, or print and return nonsense: what it does ends with its
 process, and of what it says as many bytes are read as a sound detector needs. It gets one thread.
+
+Its time is the processor's where that can be known, so that others on a busy machine take none of
+it; a limit by the clock ends what waits for ever.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -17,7 +21,7 @@ import threading
 import time
 import zipfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -27,7 +31,7 @@ from numpy.typing import NDArray
 
 from keystab.audit.detectors import Detector
 
-__all__ = ["Found", "Limits", "detections"]
+__all__ = ["Found", "Limits", "detections", "why_not_there"]
 
 _ONE_THREAD = dict.fromkeys(
     (
@@ -47,17 +51,21 @@ class Limits:
     Parameters
     ----------
     seconds : float
-        For one picture.
+        Of the processor for one picture, for all processes that it started together; by the clock
+        where the processor's time is not known.
     start : float
-        Until the detector is there, and more seconds for the first picture of a library's, which
-        may compile its code.
+        The same until the detector is there, and more seconds for the pictures of a library's
+        together, of which the first may compile its code, and another the rest of it.
     output : int
         Bytes that it may print, for all pictures together.
+    patience : float
+        How many times as much it may take by the clock.
     """
 
     seconds: float = 20.0
     start: float = 60.0
     output: int = 2**18
+    patience: float = 5.0
 
 
 class Found(NamedTuple):
@@ -75,6 +83,8 @@ class Found(NamedTuple):
         Version of what was run.
     ended : bool
         Whether its process was ended, or ended, before this picture was done.
+    not_there : bool
+        Whether it could not even be imported or started.
     """
 
     keypoints: pd.DataFrame | None
@@ -82,6 +92,7 @@ class Found(NamedTuple):
     problem: str
     version: str
     ended: bool = False
+    not_there: bool = False
 
 
 def detections(
@@ -138,6 +149,82 @@ def detections(
             said.thread.join(timeout=1.0)
 
 
+def why_not_there(
+    detector: Detector, limits: Limits | None = None, python: str = sys.executable
+) -> str:
+    """Why a detector cannot be imported or started, from a try with one small picture.
+
+    Parameters
+    ----------
+    detector, limits, python
+        See `detections`; by the clock it gets no more than the limits say.
+
+    Returns
+    -------
+    str
+        One line; empty where it is there, though it may fail with this picture.
+    """
+    place = np.arange(64.0) - 31.5
+    bump = np.exp(-(place**2) / 18.0)
+    limits = replace(limits or Limits(), patience=1.0)
+    (found,) = detections(detector, [0.2 + 0.6 * np.outer(bump, bump)], [0.5], limits, python)
+    return found.problem if found.not_there else ""
+
+
+class _Time:
+    """What a process and those that it started have taken since a moment."""
+
+    def __init__(self, pid: int, patience: float) -> None:
+        self._pid, self._patience = pid, patience
+        self.restart(math.inf)
+
+    def restart(self, allowed: float) -> None:
+        """Count from now on, up to a limit."""
+        self._allowed, self._since, self._asked = allowed, time.monotonic(), -math.inf
+        self._used = _processor_seconds(self._pid)
+
+    def problem(self) -> str:
+        """That it took too long, where it did."""
+        clock = time.monotonic() - self._since
+        allowed = self._allowed
+        if clock <= allowed:
+            return ""  # one thread takes no more of the processor, and it should have one
+        if self._patience > 1 and clock > self._patience * allowed:
+            return f"it took more than {self._patience * allowed:g} s by the clock"
+        if clock - self._asked < min(0.5, allowed / 4):
+            return ""  # asking costs milliseconds
+        self._asked = clock
+        over = self._patience <= 1 or self.taken() > allowed
+        return f"it took more than {allowed:g} s" if over else ""
+
+    def taken(self) -> float:
+        """Seconds of the processor, where these are known, and no more than by the clock."""
+        clock, used = time.monotonic() - self._since, _processor_seconds(self._pid)
+        if self._used is None or used is None:
+            return clock
+        return min(clock, max(0.0, used - self._used))
+
+
+def _processor_seconds(session: int) -> float | None:
+    """Processor time of the processes of a session and of those that they waited for; Linux only.
+
+    What has left the session is not seen before its end, if then.
+    """
+    total, known = 0, False
+    try:
+        ticks = os.sysconf("SC_CLK_TCK")
+        for name in os.listdir("/proc"):
+            if name.isdigit():
+                with contextlib.suppress(OSError, ValueError, IndexError):  # it has just ended
+                    about = Path("/proc", name, "stat").read_bytes().rpartition(b")")[2].split()
+                    if int(about[3]) == session:
+                        total += sum(map(int, about[11:15]))
+                        known = True
+    except (OSError, ValueError, AttributeError):
+        return None
+    return total / ticks if known else None
+
+
 class _Said:
     """What a process prints: counted, and its end kept."""
 
@@ -171,7 +258,8 @@ def _answers(
     more: float,
 ) -> Iterator[Found]:
     version, started = "", folder / "started.json"
-    since, allowed = time.monotonic(), limits.start
+    taken = _Time(process.pid, limits.patience)
+    taken.restart(limits.start)
     for number, image in enumerate(images):
         found, failed = folder / f"found_{number:03d}.npz", folder / f"failed_{number:03d}.json"
         problem = ""
@@ -179,26 +267,31 @@ def _answers(
             over = process.poll() is not None
             if number == 0 and not version and started.exists():
                 version = one_line(str(_read_json(started).get("version", ""))) or " "
-                since, allowed = time.monotonic(), limits.seconds + more
+                taken.restart(limits.seconds + more)
+            there = bool(version) or number > 0
             if said.too_much:
                 problem = f"it printed more than {limits.output} bytes"
             elif over and not (found.exists() or failed.exists()):
                 said.thread.join(timeout=1.0)
                 problem = _how_it_ended(process.returncode, said.last_line())
-            elif time.monotonic() - since > allowed:
-                problem = f"it took more than {allowed:g} s for a picture"
+            elif problem := taken.problem():
+                problem += " for a picture (--time-limit)" if there else " to start"
             if problem:
+                not_there = over and not there
                 for _ in range(number, len(images)):
-                    yield Found(None, math.nan, problem, version.strip(), ended=True)
+                    yield Found(None, math.nan, problem, version.strip(), True, not_there)
                 return
             time.sleep(_POLL)
         version = version or one_line(str(_read_json(started).get("version", "")))
-        since, allowed = time.monotonic(), limits.seconds
+        more -= min(more, max(0.0, taken.taken() - limits.seconds))
+        taken.restart(limits.seconds + more)
         if failed.exists():
-            problem = str(_read_json(failed).get("problem", "it failed"))
+            about = _read_json(failed)
+            problem = str(about.get("problem", "it failed"))
             if problem.startswith("it ended with status") and said.last_line():
                 problem += f": {said.last_line()}"
-            yield Found(None, math.nan, one_line(problem), version.strip())
+            not_there = about.get("not_there") is True
+            yield Found(None, math.nan, one_line(problem), version.strip(), False, not_there)
         else:
             keypoints, seconds, problem = _checked(found, image.shape)
             yield Found(keypoints, seconds, problem, version.strip())

@@ -43,6 +43,7 @@ PER_KEYPOINT = 400.0
 """Pixels per keypoint where detectors are compared at the same number of them."""
 
 _FEWEST_PHASES = 30
+_NEAR = 0.5  # of half a pixel beside the others, drifts do not ask: many are false matches
 _OCTAVES = ((LOW, 2 * LOW), (2 * LOW, HIGH))
 _BANDS = tuple((LOW * 2 ** (k / 2), LOW * 2 ** ((k + 1) / 2)) for k in range(4))
 
@@ -152,6 +153,8 @@ class _Pairs(NamedTuple):
     scale: NDArray[np.float64]
     """Logarithm of the detected sigma over the true one."""
     view: NDArray[np.intp]
+    extremum: NDArray[np.intp]
+    """Which extremum it is, the same number in all views."""
     found: pd.DataFrame
 
 
@@ -170,6 +173,7 @@ def _pairs(seen: Sequence[_Seen]) -> _Pairs:
                 sigma,
                 np.log(found["sigma"].to_numpy(dtype=float) / sigma),
                 np.full(len(rows), number),
+                _extrema(each.view, number)[each.partner[rows]],
                 found,
             )
         )
@@ -179,8 +183,15 @@ def _pairs(seen: Sequence[_Seen]) -> _Pairs:
         np.concatenate([part.sigma for part in parts]),
         np.concatenate([part.scale for part in parts]),
         np.concatenate([part.view for part in parts]),
+        np.concatenate([part.extremum for part in parts]),
         pd.concat([part.found for part in parts], ignore_index=True),
     )
+
+
+def _extrema(view: View, number: int) -> NDArray[np.intp]:
+    """Which extremum each row of the truth is; below 0, one that no other view has."""
+    own: NDArray[np.intp] = -1 - number * 2**24 - np.arange(len(view.truth))
+    return own if view.extremum is None else view.extremum
 
 
 def _recalled(
@@ -237,7 +248,8 @@ def _places(pairs: _Pairs, shape: tuple[int, ...]) -> dict[str, Any]:
     """Where what is found lies beside what it stands for."""
     distance = np.hypot(*pairs.error.T)
     bias = quantile(pairs.scale)
-    drifts = drift(pairs.error, pairs.position, (float(shape[0]), float(shape[1])))
+    extent = (float(shape[0]), float(shape[1]))
+    drifts = drift(pairs.error, pairs.position, extent, pairs.extremum, _NEAR)
     held = NOTHING
     if {"std_y", "std_x"} <= {*pairs.found} and len(pairs.found):
         std_y, std_x = (pairs.found[name].to_numpy(dtype=float) for name in ("std_y", "std_x"))

@@ -181,7 +181,10 @@ def own_command(command: str, folder: Path) -> Callable[..., Columns]:
         filled = words
         for name, value in names.items():
             filled = [word.replace(name, str(value)) for word in filled]
-        ended = subprocess.run(filled, stdin=subprocess.DEVNULL)
+        try:
+            ended = subprocess.run(filled, stdin=subprocess.DEVNULL)
+        except OSError as error:
+            raise NotThereError(f"{filled[0]} cannot be started: {error.strerror}") from None
         if ended.returncode < 0:
             raise RuntimeError(f"it was ended by signal {-ended.returncode}")
         if ended.returncode:
@@ -265,6 +268,10 @@ def png(pixels: Any) -> bytes:
 # The process
 
 
+class NotThereError(RuntimeError):
+    """A detector that cannot be imported or started, whatever the image."""
+
+
 def detector_of(job: dict[str, Any], folder: Path) -> tuple[Callable[..., Columns], str]:
     """Detector of a job, and its version."""
     kind, name = job["kind"], job["name"]
@@ -313,6 +320,7 @@ def main(folder: Path) -> int:
     except BaseException as error:
         detect, version = refusing(error), ""
     write(folder / "started.json", partial(note, {"version": version}))
+    problems: dict[str, str] = {}  # said of one image, and the same of all others
     for number, blur in enumerate(job["blurs"]):
         image = np.load(folder / f"view_{number:03d}.npy")
         start = time.perf_counter()
@@ -325,10 +333,11 @@ def main(folder: Path) -> int:
             write(folder / f"found_{number:03d}.npz", partial(save, numbers))
         except Exception as error:
             problem = in_one_line(error)
-            if job["kind"] == "function" and not isinstance(error, RuntimeError):
-                problem += f" (the image is grey, of shape {image.shape})"
-            said = partial(note, {"problem": problem})
-            write(folder / f"failed_{number:03d}.json", said)
+            shape = f" (the image is grey, of shape {image.shape})"
+            shown = job["kind"] == "function" and not isinstance(error, RuntimeError)
+            problem = problems.setdefault(problem, problem + shape * shown)
+            said = {"problem": problem, "not_there": isinstance(error, NotThereError)}
+            write(folder / f"failed_{number:03d}.json", partial(note, said))
     return 0
 
 
@@ -336,12 +345,12 @@ def refusing(error: BaseException) -> Callable[..., Columns]:
     """Detector that could not be made: it fails with every image."""
 
     def detect(image: Any, camera_blur: float) -> Columns:
-        raise RuntimeError(in_one_line(error))
+        raise NotThereError(in_one_line(error))
 
     return detect
 
 
-def note(about: dict[str, str], path: Path) -> None:
+def note(about: dict[str, Any], path: Path) -> None:
     """Write a few words."""
     path.write_text(json.dumps(about), encoding="utf-8")
 
@@ -358,7 +367,8 @@ def in_one_line(error: BaseException) -> str:
     if isinstance(error, ModuleNotFoundError):
         return f"not installed: {words}"
     kind = type(error).__name__
-    return words if kind in ("RuntimeError", "FileNotFoundError") and words else f"{kind}: {words}"
+    plain = ("RuntimeError", "FileNotFoundError", "NotThereError")
+    return words if kind in plain and words else f"{kind}: {words}"
 
 
 if __name__ == "__main__":

@@ -24,8 +24,8 @@ def audit(args: argparse.Namespace) -> None:
     """Audit detectors, and write tables, a figure and a page."""
     from keystab.audit.conditions import CONDITIONS, PLAN, QUICK, condition_of
     from keystab.audit.detectors import chosen
-    from keystab.audit.isolation import Limits
-    from keystab.audit.page import page
+    from keystab.audit.isolation import Limits, why_not_there
+    from keystab.audit.page import are_axes_swapped, page
     from keystab.audit.run import Audit, audited, joined, with_conventions
     from keystab.figures import audit as figure
     from keystab.figures._render import save
@@ -40,20 +40,26 @@ def audit(args: argparse.Namespace) -> None:
         raise InputError(f"--python {python}: no such program; give the path of a Python")
     detectors = chosen(args.detectors, _convention(args.convention))
     plan = QUICK if args.quick else PLAN
+    limits = Limits(args.time_limit)
+    for detector in detectors:
+        if detector.kind != "library" and (why := why_not_there(detector, limits, python)):
+            raise InputError(f"{detector.name}: {why}")
     _say(start, f"{len(detectors)} settings of detectors; finding what there is to be found")
     stage, scene = _scene(args, plan)
     _say(start, f"{len(stage.truth)} true extrema of {scene}")
     conditions = [condition_of(name, plan, stage) for name in CONDITIONS]
     views = sum(len(condition.views) for condition in conditions)
     _say(start, f"{len(conditions)} conditions, {views} pictures")
-    limits = Limits(args.time_limit)
     problems: list[str] = []
     found = []
     for tables in audited(Audit(conditions), detectors, limits, python, problems.append):
         found.append(tables)
         first = tables.audit.iloc[0]
         bias = first["bias_y"], first["bias_x"]
-        said = f"bias on blobs {bias[0]:+.3f}, {bias[1]:+.3f} px" if bias[0] == bias[0] else ""
+        known = first["bias_y_low"] == first["bias_y_low"]
+        said = f"bias on blobs {bias[0]:+.3f}, {bias[1]:+.3f} px" if known else ""
+        if are_axes_swapped(first["convention_declared"], first["convention_found"]):
+            said = "its axes are swapped"
         named = (
             "controls" if len(found) == 1 else f"{first['detector']}, {first['setting']}: {said}"
         )

@@ -366,8 +366,8 @@ def _audit_arguments(to: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     to.add_argument(
         "--time-limit", type=_seconds, default=20.0, metavar="S",
-        help="seconds by the clock that a detector may take for a picture, more on a busy machine "
-        "(default 20)",
+        help="seconds that a detector may take for a picture (default 20): of the processor, where "
+        "that is known, and five times as many by the clock",
     )  # fmt: skip
     to.add_argument(
         "--threads", type=int, default=2, metavar="N", help="threads of the truth (default 2)"

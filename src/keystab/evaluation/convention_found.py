@@ -53,7 +53,7 @@ class FoundConvention(NamedTuple):
         >>> print(FoundConvention(0.249, 0.251, "yx", 1.98))
         0.25 yx diameter
         >>> print(FoundConvention(0.1, -0.3, "yx", 1.2))
-        (0.10, -0.30) yx 1.20 sigma
+        (0.10, -0.30) yx 1.2 sigma
         """
         if not self.order:
             return ""
@@ -62,7 +62,7 @@ class FoundConvention(NamedTuple):
         for named in ORIGINS:
             if (np.abs(both - named) <= ORIGIN_TOLERANCE).all():
                 origin = f"{named:g}"
-        scale = f"{self.factor:.2f} sigma"
+        scale = f"{float(f'{self.factor:.3g}'):g} sigma"
         for name, factor in FACTORS.items():
             if abs(math.log(self.factor / factor)) <= FACTOR_TOLERANCE:
                 scale = name

@@ -10,8 +10,11 @@ from keystab.figures import palette, style
 from keystab.figures._render import Tables, check_tables, main
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
     from pandas import DataFrame
 
 _ENDS = ("", "_low", "_high")
@@ -19,8 +22,8 @@ _WITH_ENDS = ("bias_y", "bias_x", "error_median", "recall", "precision", "own_re
 
 TABLES = {
     "audit.csv": (
-        *("detector", "setting", "condition", "chance", "error_p90", "repeatability_1"),
-        *("repeatability_0.5", "repeatability_matched"),
+        *("detector", "setting", "condition", "problem", "chance", "error_p90"),
+        *("repeatability_1", "repeatability_matched"),
         *(f"{name}{end}" for name in _WITH_ENDS for end in _ENDS),
     ),
     "audit_octaves.csv": (
@@ -31,6 +34,11 @@ TABLES = {
 """Files read, with the columns that they must have."""
 
 BLOBS, SCENE, TURNED, NOISY = "blobs", "translations", "rotation 90", "noise 0.03"
+
+_CLEAR = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}  # of lines beneath
+
+FARTHEST = 0.35
+"""Pixels at which panels a and b end; what lies beyond stands there as a number."""
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
@@ -47,7 +55,8 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     -------
     matplotlib Figure
         a: bias on isolated blobs; b: bias by octave, on the scene; c: errors on the scene; d:
-        recall and precision; e: repeatability.
+        recall and precision; e: repeatability within a pixel. A row without numbers says "failed",
+        or "too few" where so little was found that numbers have no interval.
 
     Raises
     ------
@@ -68,7 +77,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         }
         nothing = table.iloc[:0].set_index(["detector", "setting"]).reindex(names)
         scene = by.get(SCENE, nothing)
-        titles = ("bias, blobs", "bias, scene", "error", "found", "repeated")
+        titles = ("bias, blobs", "bias, scene", "error", "found", "same to 1 px")
         for ax, letter, title in zip(axes, "abcde", titles, strict=True):
             style.letter(ax, letter, title)
             ax.set_ylim(len(names) - 0.5, -0.5)
@@ -82,17 +91,61 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         _draw_errors(axes[2], scene)
         _draw_found(axes[3], scene)
         _draw_repeated(axes[4], by.get(TURNED, nothing), by.get(NOISY, nothing))
+        for ax, name in zip(axes, (BLOBS, SCENE, SCENE, SCENE, TURNED), strict=True):
+            if name in by:
+                _say_why(ax, by[name]["problem"].tolist())
         return style.settle(figure, draft)
 
 
-def _dots(ax: Axes, rows: DataFrame, name: str, colour: str, up: float, times: float = 1.0) -> None:
-    """Draw a number of every row with its interval."""
+def _dots(
+    ax: Axes, rows: DataFrame, name: str, colour: str, up: float, times: float = 1.0
+) -> NDArray[np.float64]:
+    """Draw a number of every row with its interval; none that has no interval. Returns these."""
     place = np.arange(len(rows)) + up
     low, high = (times * rows[f"{name}{end}"].to_numpy(dtype=float) for end in ("_low", "_high"))
     value = times * rows[name].to_numpy(dtype=float)
-    ax.hlines(place, np.where(np.isnan(low), value, low), np.where(np.isnan(high), value, high),
-              color=colour, linewidth=0.9)  # fmt: skip
+    value = np.where(np.isnan(low) | np.isnan(high), np.nan, value)
+    ax.hlines(place, low, high, color=colour, linewidth=0.9)
     ax.plot(value, place, "o", color=colour, markersize=2.6, label=name)
+    return value
+
+
+def _end_at(ax: Axes, values: list[NDArray[np.float64]], colours: Sequence[str]) -> None:
+    """End an axis, and write what lies beyond beside an arrow there."""
+    ax.set(xlim=(-FARTHEST, FARTHEST), xticks=(-0.2, 0.0, 0.2))
+    for side, marker, align in ((-1, "<", "left"), (1, ">", "right")):
+        beyond = [side * each > FARTHEST for each in values]
+        for far, up, colour in zip(beyond, (-0.16, 0.16), colours, strict=False):
+            place = np.flatnonzero(far)
+            ax.plot(
+                np.full(len(place), 0.96 * side * FARTHEST), place + up, marker, color=colour,
+                markersize=2.6, label="beyond",
+            )  # fmt: skip
+        for row in np.flatnonzero(np.any(beyond, axis=0)):
+            numbers = [
+                f"{each[row]:+.2f}" for each, far in zip(values, beyond, strict=True) if far[row]
+            ]
+            ax.annotate(
+                ", ".join(dict.fromkeys(numbers)), (side * FARTHEST, row), (-side * 4, 0),
+                textcoords="offset points", ha=align, va="center_baseline", fontsize=style.SMALL,
+                bbox=_CLEAR,
+            )  # fmt: skip
+
+
+def _say_why(ax: Axes, problems: list[object]) -> None:
+    """Write into each row without numbers why there are none."""
+    drawn = np.zeros(len(problems), dtype=bool)
+    for line in ax.lines:
+        if line.get_marker() not in ("None", "|"):
+            x, y = (np.asarray(each, dtype=float) for each in line.get_data())
+            drawn[np.round(y[np.isfinite(x)]).astype(int)] = True
+    for row in np.flatnonzero(~drawn):
+        failed = isinstance(problems[row], str) and problems[row] != ""
+        ax.text(
+            0.5, row, "failed" if failed else "too few", transform=ax.get_yaxis_transform(),
+            color=palette.GREY, fontsize=style.SMALL, ha="center", va="center_baseline",
+            bbox=_CLEAR,
+        )  # fmt: skip
 
 
 def _list(ax: Axes, names: list[tuple[str, str]]) -> None:
@@ -110,10 +163,12 @@ def _list(ax: Axes, names: list[tuple[str, str]]) -> None:
 
 def _draw_bias(ax: Axes, rows: DataFrame) -> None:
     colours = palette.AXIS_COLOURS
-    _dots(ax, rows, "bias_y", colours["y"], -0.16)
-    _dots(ax, rows, "bias_x", colours["x"], 0.16)
+    values = [
+        _dots(ax, rows, f"bias_{axis}", colours[axis], up)
+        for axis, up in (("y", -0.16), ("x", 0.16))
+    ]
     ax.axvline(0.0, color=palette.GREY, linewidth=0.6)
-    ax.set(xlim=(-0.35, 0.35), xticks=(-0.2, 0.0, 0.2))
+    _end_at(ax, values, (colours["y"], colours["x"]))
     _list(ax, [("y, median (px)", colours["y"]), ("x", colours["x"])])
     style.finish_axes(ax)
 
@@ -121,23 +176,31 @@ def _draw_bias(ax: Axes, rows: DataFrame) -> None:
 def _draw_octaves(ax: Axes, table: DataFrame, names: list[tuple[str, str]]) -> None:
     rows = table[table["condition"] == SCENE]
     colours = palette.OCTAVE_COLOURS
+    values = []
     for low, up, colour in zip(
         sorted(set(rows["sigma_low"])), (-0.16, 0.16), colours, strict=False
     ):
         own = rows[rows["sigma_low"] == low].set_index(["detector", "setting"]).reindex(names)
-        _dots(ax, own, "bias_y", colour, up)
+        values.append(_dots(ax, own, "bias_y", colour, up))
     ax.axvline(0.0, color=palette.GREY, linewidth=0.6)
-    ax.set(xlim=(-0.35, 0.35), xticks=(-0.2, 0.0, 0.2))
+    _end_at(ax, values, colours)
     _list(ax, [("y, first octave (px)", colours[0]), ("second octave", colours[1])])
     style.finish_axes(ax)
 
 
 def _draw_errors(ax: Axes, rows: DataFrame) -> None:
     place = np.arange(len(rows))
-    _dots(ax, rows, "error_median", palette.INK, 0.0)
-    ax.plot(rows["error_p90"], place, "|", color=palette.GREY, markersize=6.0, label="error_p90")
+    known = np.isfinite(_dots(ax, rows, "error_median", palette.INK, 0.0))
+    ax.plot(
+        rows["error_p90"].where(known),
+        place,
+        "|",
+        color=palette.GREY,
+        markersize=6.0,
+        label="error_p90",
+    )
     ax.set_xscale("log")
-    values = rows[["error_median", "error_p90"]].to_numpy(dtype=float)
+    values = rows.loc[known, ["error_median", "error_p90"]].to_numpy(dtype=float)
     values = values[np.isfinite(values) & (values > 0)]
     if len(values):
         ax.set_xlim(0.6 * values.min(), 1.6 * values.max())
@@ -151,16 +214,15 @@ def _draw_found(ax: Axes, rows: DataFrame) -> None:
     _dots(ax, rows, "precision", colours["precision"], 0.16, 100.0)
     ax.plot(100 * rows["chance"], np.arange(len(rows)), "|", color=palette.GREY, markersize=5.0)
     ax.set_xlim(-4, 106)
-    _list(
-        ax, [("recall (%), grey: chance", colours["recall"]), ("precision", colours["precision"])]
-    )
+    names = ("recall (%)", "precision", "chance")
+    _list(ax, list(zip(names, (*colours.values(), palette.GREY), strict=True)))
     style.finish_axes(ax)
 
 
 def _draw_repeated(ax: Axes, turned: DataFrame, noisy: DataFrame) -> None:
     place = np.arange(len(turned))
     for rows, colour, up in ((turned, palette.INK, -0.16), (noisy, palette.NOISY_COLOUR, 0.16)):
-        ax.plot(100 * rows["repeatability_0.5"], place + up, "o", color=colour, markersize=2.6)
+        ax.plot(100 * rows["repeatability_1"], place + up, "o", color=colour, markersize=2.6)
         ax.plot(
             100 * rows["repeatability_matched"], place + up, "o", color=colour, markersize=4.0,
             markerfacecolor="none",
