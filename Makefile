@@ -61,7 +61,7 @@ audit: environment .venv-audit/.stamp ## Hold detectors of others against what i
 	$(SNAKEMAKE) '$(AUDITED)' $(OVERLAY)
 
 scenes: environment ## The claims on 33 scenes, which takes hours (SCENES="lake text_1": on some)
-	$(NO_CORES)python tools/scenes.py $(SCENES) -- $(EXECUTOR) $(OVERLAY)
+	$(NO_CORES)python tools/scenes.py $(foreach name,$(SCENES),'$(subst ','\'',$(name))') -- $(EXECUTOR) $(OVERLAY)
 
 why: environment ## What would run, why, and for how long (TARGET=figures/fig5.pdf: for one file)
 	@python tools/why.py $(if $(TARGET),'$(subst ','\'',$(TARGET))') $(OVERLAY)

@@ -92,6 +92,13 @@ def test_a_file_name_with_a_blank_is_one_target_of_why(checkout):
     assert (checkout / "said").read_text().endswith("tools/why.py|PYTHONPATH=\n")
 
 
+def test_names_of_scenes_are_words_and_no_commands(checkout):
+    run(checkout, "make", "scenes", "SCENES=lake text_1; touch owned 'it's")
+    said = (checkout / "said").read_text()
+    assert "tools/scenes.py|lake|text_1;|touch|owned|'it's|--|" in said
+    assert not (checkout / "owned").exists()
+
+
 NEW_PYTHON = """#!/bin/sh
 # Stands for a Python that makes .venv, and for that in it: says what pip would go by.
 case "$*" in
