@@ -39,9 +39,11 @@ if __name__ == "__main__":
 
     import numpy as np
 
+    from keystab.camera.views import ViewSpec
     from keystab.detection.detector import detect_keypoints
     from keystab.detection.extrema import extrema_of_array
     from keystab.prediction.uncertainty import keypoint_uncertainty
+    from keystab.truth.scene_extrema import scene_extrema
     from keystab.truth.true_extrema import true_extrema
 
     picture, large = (np.random.default_rng(0).random((side, side)) for side in (40, 88))
@@ -50,6 +52,7 @@ if __name__ == "__main__":
         detect_keypoints(picture, 1.1, n_spo=12, oversampling=oversampling)
         detect_keypoints(large, 1.1, n_spo=18, oversampling=oversampling)  # from few samples
     true_extrema(picture, 0.5, n_spo=[4])
+    scene_extrema(picture, ViewSpec(1.1, 2.0, (20, 20)), n_spo=[4])
     extrema_of_array(np.zeros((3, 3, 3)), 0.0)
     keypoint_uncertainty(picture, 0.5, (0.01, 0.01), n_spo=4)
     copy_beside_modules(folder, PACKAGE_FOLDER)
