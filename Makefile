@@ -81,7 +81,7 @@ verify: environment ## Check the results here, or ARCHIVE=FILE (RECOMPUTE=fig5, 
 reference: environment ## Copy tables, claims and PNG figures to results/reference, to be committed
 	keystab reference $(OVERLAY)
 
-bench: environment ## Compare speed and memory with other detectors
+bench: environment .venv-audit/.stamp ## Compare speed and memory with other detectors
 	python -m benchmarks
 
 check: environment check-workflow ## Formatters, linters, types, the workflow

@@ -101,6 +101,12 @@ def test_files_of_rows_lie_at_the_place_of_their_scene():
     assert plain(HERE) == ["results/truth/view_2.parquet", "results/truth/view_3.parquet"]
 
 
+def test_each_search_has_a_table_of_extrema_and_one_of_traces():
+    found = {name: paths(THERE) for name, paths in RULES.detections(rows, "zooms").items()}
+    folder = "results/scenes/roof/keypoints/zooms"
+    assert found == {name: [f"{folder}/{name}_n2.parquet"] for name in ("extrema", "traces")}
+
+
 def test_files_of_several_scenes_lie_each_at_its_own_place():
     class Scene(NamedTuple):
         place: str

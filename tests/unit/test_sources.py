@@ -81,7 +81,7 @@ def private_parts(nodes: list[ast.AST]) -> set[str]:
         ("getattr(figure, '_layout')", {"_layout"}),
         ("class A:\n    def _b(self): return self._c", {"_c"}),
         ("class A:\n    def __init__(self): self._b = 1\ndef f(a): return a._b", set()),
-        ("from keystab.stages._command import command\nx.__dict__, row._asdict()", set()),
+        ("from keystab.utils.stage_command import command\nx.__dict__, row._asdict()", set()),
     ],
 )
 def test_private_parts_are_seen(code, found):

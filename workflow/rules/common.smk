@@ -78,7 +78,8 @@ RULES = Rules(
     software=imported_software.software_digest(Path(workflow.basedir, "environment.lock")),
 )
 of, column, files, placed = RULES.of, RULES.column, RULES.files, RULES.placed
-stage, setting, parameter, growing = RULES.stage, RULES.setting, RULES.parameter, RULES.growing
+detections, stage, setting = RULES.detections, RULES.stage, RULES.setting
+parameter, growing = RULES.parameter, RULES.growing
 
 # Compiled loops are kept with the other things that can be made again, and shared by all jobs.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(code_digest.folder_of_loops(Path.cwd())))
@@ -99,6 +100,12 @@ onstart:
     _limit = getattr(workflow.scheduler, "job_rate_limiter", None)
     if _limit is not None and (_limit.max_jobs, _limit.timespan) == (100, 1):
         workflow.scheduler.job_rate_limiter = None
+
+
+def views(name):
+    """Input of a rule: a set of views, a store that its checksums speak for."""
+    folder = f"{HERE}views/{name}"
+    return {"views": ancient(folder), "views_digest": f"{folder}.sha256"}
 
 
 def studies_of_pictures():

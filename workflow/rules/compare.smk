@@ -1,12 +1,19 @@
 """What the detections in many views of the scene have in common (sections 5.5 to 6.3).
 
 Comes in: tables of extrema and refinement traces of sets of views. Goes out: tidy tables,
-tables/fig7*.csv to fig12*.csv, figS1*.csv, figS2.csv, figS5*.csv and those of sweeps that no figure is
-about, that the figures draw. Steps: accept
-refined keypoints; bring them to the frame of the first view; keep the common field of view and range
-of scales; find the minimum set of unique keypoints; look each up in every view; curves, precisions
-and counts with their intervals.
+tables/fig7*.csv to fig12*.csv, figS1*.csv, figS2.csv, figS5*.csv and those of sweeps that no figure
+is about. Steps: accept refined keypoints; bring them to the frame of the first view; keep the common
+field of view and range of scales; find the minimum set of unique keypoints; look each up in every
+view; curves, precisions and counts with their intervals.
 """
+
+# What says which keypoints of several views are compared, and which of them are the same.
+IN_VIEWS = (
+    parameters.ComparedInViews,
+    parameters.Same,
+    "comparison.soft_ends",
+    parameters.Acceptance,
+)
 
 
 rule match_views:
@@ -14,10 +21,7 @@ rule match_views:
     input:
         views=ancient(files("views/{}", plan.sets_of_figure, "{figure}")),
         views_digest=files("views/{}.sha256", plan.sets_of_figure, "{figure}"),
-        extrema=files(
-            "keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_figure, "{figure}"
-        ),
-        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches_of_figure, "{figure}"),
+        **detections(plan.searches_of_figure, "{figure}"),
     output:
         curves=f"{HERE}tables/{{figure}}_curves.csv",
         precision=f"{HERE}tables/{{figure}}_precision.csv",
@@ -34,10 +38,7 @@ rule match_views:
             "match_views",
             "sets.{set}.n_spo",
             "stability.curve_n_spo",
-            parameters.ComparedInViews,
-            parameters.Same,
-            "comparison.soft_ends",
-            parameters.Acceptance,
+            *IN_VIEWS,
             "stability.minimum_share",
             "stability.n_resamples",
             max_offsets=of(plan.further_limits, "{figure}", "max_offsets"),
@@ -57,10 +58,7 @@ rule match_translations:
     input:
         views=ancient(files("views/{set}", plan.searches, "translations_wide")),
         views_digest=files("views/{set}.sha256", plan.searches, "translations_wide"),
-        extrema=files(
-            "keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches, "translations_wide"
-        ),
-        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches, "translations_wide"),
+        **detections(plan.searches, "translations_wide"),
     output:
         curves=f"{HERE}tables/fig8_translations.csv",
         counts=f"{HERE}tables/fig8_translations_counts.csv",
@@ -71,10 +69,7 @@ rule match_translations:
     params:
         **stage(
             "match_sweep",
-            parameters.ComparedInViews,
-            parameters.Same,
-            "comparison.soft_ends",
-            parameters.Acceptance,
+            *IN_VIEWS,
             "stability.n_resamples",
             of_set="translations_wide",
             name="n_spo",
@@ -91,10 +86,8 @@ rule match_translations:
 rule match_sift:
     """Figure 7: stability of SIFT with its own refinement, with and without its filters."""
     input:
-        views=ancient(f"{HERE}views/shipped"),
-        views_digest=f"{HERE}views/shipped.sha256",
-        extrema=files("keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches, "shipped"),
-        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches, "shipped"),
+        **views("shipped"),
+        **detections(plan.searches, "shipped"),
     output:
         curves=f"{HERE}tables/fig7_shipped.csv",
         counts=f"{HERE}tables/fig7_shipped_counts.csv",
@@ -123,8 +116,7 @@ rule match_sift:
 rule match_kappas:
     """Figure 9: which keypoint is detected with which ratio of the difference of Gaussians."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         extrema=f"{HERE}keypoints/kappas_extrema.parquet",
         traces=f"{HERE}keypoints/kappas_traces.parquet",
     output:
@@ -157,10 +149,7 @@ rule match_aliasing:
     input:
         views=ancient(files("views/{}", plan.sets_of_figure, "{figure}")),
         views_digest=files("views/{}.sha256", plan.sets_of_figure, "{figure}"),
-        extrema=files(
-            "keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_figure, "{figure}"
-        ),
-        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches_of_figure, "{figure}"),
+        **detections(plan.searches_of_figure, "{figure}"),
     output:
         curves=f"{HERE}tables/{{figure}}_curves.csv",
         counts=f"{HERE}tables/{{figure}}_counts.csv",
@@ -173,10 +162,7 @@ rule match_aliasing:
     params:
         **stage(
             "match_sweep",
-            parameters.ComparedInViews,
-            parameters.Same,
-            "comparison.soft_ends",
-            parameters.Acceptance,
+            *IN_VIEWS,
             "stability.n_resamples",
             name=of(plan.swept, "{figure}"),
             values=column("value", plan.searches_of_figure, "{figure}"),
@@ -198,10 +184,7 @@ use rule match_aliasing as match_sweep with:
     params:
         **stage(
             "match_sweep",
-            parameters.ComparedInViews,
-            parameters.Same,
-            "comparison.soft_ends",
-            parameters.Acceptance,
+            *IN_VIEWS,
             parameters.Octaves,
             "stability.n_resamples",
             name=of(plan.swept, "{figure}"),
@@ -215,8 +198,7 @@ rule match_blur_zooms:
     input:
         views=ancient(files("views/{set}", plan.searches_of_sweep, "{sweep}")),
         views_digest=files("views/{set}.sha256", plan.searches_of_sweep, "{sweep}"),
-        extrema=files("keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
-        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches_of_sweep, "{sweep}"),
+        **detections(plan.searches_of_sweep, "{sweep}"),
     output:
         curves=f"{HERE}tables/{{sweep}}_curves.csv",
         counts=f"{HERE}tables/{{sweep}}_counts.csv",
@@ -230,10 +212,7 @@ rule match_blur_zooms:
     params:
         **stage(
             "match_sweep",
-            parameters.ComparedInViews,
-            parameters.Same,
-            "comparison.soft_ends",
-            parameters.Acceptance,
+            *IN_VIEWS,
             "stability.n_resamples",
             last_scale=of(plan.last_scale, "{sweep}"),
             name=of(plan.stated_key, "{sweep}"),
@@ -256,10 +235,7 @@ use rule match_blur_zooms as match_unbalanced with:
     params:
         **stage(
             "match_sweep",
-            parameters.ComparedInViews,
-            parameters.Same,
-            "comparison.soft_ends",
-            parameters.Acceptance,
+            *IN_VIEWS,
             "stability.n_resamples",
             last_scale=of(plan.last_scale, "{sweep}"),
             name=of(plan.stated_key, "{sweep}"),
@@ -279,10 +255,7 @@ use rule match_blur_zooms as match_large_scales with:
     params:
         **stage(
             "match_sweep",
-            parameters.ComparedInViews,
-            parameters.Same,
-            "comparison.soft_ends",
-            parameters.Acceptance,
+            *IN_VIEWS,
             parameters.Octaves,
             "stability.n_resamples",
             last_scale=of(plan.last_scale, "{sweep}"),
@@ -296,10 +269,8 @@ use rule match_blur_zooms as match_large_scales with:
 rule match_blurs:
     """Figure S2: keypoints of views whose blur is not the assumed one."""
     input:
-        views=ancient(f"{HERE}views/blur_errors"),
-        views_digest=f"{HERE}views/blur_errors.sha256",
-        extrema=files("keypoints/{set}/extrema_n{n_spo}.parquet", plan.searches, "blur_errors"),
-        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.searches, "blur_errors"),
+        **views("blur_errors"),
+        **detections(plan.searches, "blur_errors"),
     output:
         table=f"{HERE}tables/figS2.csv",
     log:

@@ -12,8 +12,7 @@ max_offset and max_iterations can be decided afterwards.
 rule detect:
     """Detect the extrema of one balanced sampling, in its stored scale-space or streaming it."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         store=ancient(files("scale_space/n{}", plan.kept_sampling, "{n_spo}")),
         store_digest=files("scale_space/n{}.sha256", plan.kept_sampling, "{n_spo}"),
     output:
@@ -42,8 +41,7 @@ rule detect:
 
 use rule detect as detect_cosine with:
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
     output:
         extrema=f"{HERE}keypoints/cosine_n{{n_spo}}.parquet",
         traces=f"{HERE}keypoints/cosine_traces_n{{n_spo}}.parquet",
@@ -65,8 +63,7 @@ use rule detect as detect_cosine with:
 rule detect_grid:
     """Detect the extrema of one row of figure 3's grid: one n_spo, every delta_min."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
     output:
         extrema=f"{HERE}keypoints/grid_n{{n_spo}}.parquet",
     log:
@@ -86,8 +83,7 @@ rule detect_grid:
 rule detect_views:
     """Detect the extrema of all views of a set at one sampling, in stores or streaming."""
     input:
-        views=ancient(f"{HERE}views/{{set}}"),
-        views_digest=f"{HERE}views/{{set}}.sha256",
+        **views("{set}"),
         store=ancient(files("scale_space/{set}/n{n_spo}", plan.kept_set, "{set}")),
         store_digest=files("scale_space/{set}/n{n_spo}.sha256", plan.kept_set, "{set}"),
     output:
@@ -117,8 +113,7 @@ rule detect_views:
 rule detect_kappas:
     """Detect the extrema of the view for every ratio of the difference of Gaussians."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
     output:
         extrema=f"{HERE}keypoints/kappas_extrema.parquet",
         traces=f"{HERE}keypoints/kappas_traces.parquet",

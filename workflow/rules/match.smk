@@ -10,8 +10,7 @@ in every sampling; count, rate, score, and cut out cubes.
 rule match_grid:
     """Figure 3: count the extrema of every sampling, all, comparable and unique ones."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         grid=files("keypoints/grid_n{}.parquet", plan.setting, "grid.n_spo"),
         samplings=files("keypoints/sampling_n{}.parquet", plan.setting, "samplings.n_spo"),
     output:
@@ -39,8 +38,7 @@ rule match_grid:
 rule match_samplings:
     """Figure 4: which unique keypoint is detected at which balanced sampling."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         samplings=files("keypoints/sampling_n{}.parquet", plan.setting, "samplings.n_spo"),
     output:
         matches=f"{HERE}matches/samplings.parquet",
@@ -71,8 +69,7 @@ rule match_samplings:
 rule count_refined:
     """Count the keypoints that the quadratic refinement keeps at every balanced sampling."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         samplings=files("keypoints/sampling_n{}.parquet", plan.setting, "samplings.n_spo"),
         traces=files("keypoints/traces_n{}.parquet", plan.setting, "samplings.n_spo"),
     output:
@@ -124,8 +121,7 @@ rule score_features:
 rule cut_cubes:
     """Figure 6: cut cubes out of a very dense scale-space, around stable and unstable keypoints."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         keypoints=f"{HERE}tables/fig4_keypoints.csv",
     output:
         panels=f"{HERE}tables/fig6.csv",

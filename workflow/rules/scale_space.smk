@@ -11,8 +11,7 @@ never written.
 rule scale_space:
     """Write one balanced scale-space of the view to a store."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
     output:
         store=directory(f"{HERE}scale_space/n{{n_spo}}"),
         store_digest=f"{HERE}scale_space/n{{n_spo}}.sha256",
@@ -34,8 +33,7 @@ rule scale_space:
 rule scale_spaces:
     """Write the balanced scale-spaces of all views of a set, one store per view and octave."""
     input:
-        views=ancient(f"{HERE}views/{{set}}"),
-        views_digest=f"{HERE}views/{{set}}.sha256",
+        **views("{set}"),
     output:
         store=directory(f"{HERE}scale_space/{{set}}/n{{n_spo}}"),
         store_digest=f"{HERE}scale_space/{{set}}/n{{n_spo}}.sha256",

@@ -1,9 +1,9 @@
 """The simulated camera (section 4 of the paper).
 
-Comes in: the picture of a scene, or what it is made of. Goes out: one store per set of views, views/{set}, with a file of
-checksums beside it, and tables of what figures 2 and 12 show of views. Steps: check the picture's
-pixels; blur and sample the picture for every view of the set; write the store; list its checksums;
-write pixels as numbers.
+Comes in: the picture of a scene, or what it is made of. Goes out: one store per set of views,
+views/{set}, with a file of checksums beside it, and tables of what figures 2 and 12 show of views.
+Steps: check the picture's pixels; blur and sample the picture for every view of the set; write the
+store; list its checksums; write pixels as numbers.
 """
 
 
@@ -57,8 +57,7 @@ rule simulate:
 rule describe_views:
     """Figure 2: what the simulated views look like, in numbers."""
     input:
-        views=ancient(f"{HERE}views/examples"),
-        views_digest=f"{HERE}views/examples.sha256",
+        **views("examples"),
     output:
         table=f"{HERE}tables/fig2.csv",
         pixels=f"{HERE}tables/fig2_pixels.parquet",

@@ -2,10 +2,10 @@
 
 Comes in: settings, and for what the text states of views the picture. Goes out: tables/fig1*.csv,
 figS3*.csv, figS4.csv and, beside the other tables of figure 12, fig12_theory.csv;
-aliasing_energy.csv, wrong_blur_identity.csv, zoomed_truth.csv and reference_noise.csv. Steps: the semigroup property of discrete blurs; the
-point spread functions of model cameras and the Gaussians nearest to them; Gaussian blobs of many
-sizes, the scales at which they are detected, and those that closed forms predict; the noise of the
-difference of Gaussians.
+aliasing_energy.csv, wrong_blur_identity.csv, zoomed_truth.csv and reference_noise.csv. Steps: the
+semigroup property of discrete blurs; the point spread functions of model cameras and the Gaussians
+nearest to them; Gaussian blobs of many sizes, the scales at which they are detected, and those that
+closed forms predict; the noise of the difference of Gaussians.
 """
 
 
@@ -128,8 +128,7 @@ rule view_statements:
     """Statements on the camera and on single views: aliasing, wrong blurs, zooms, noise."""
     input:
         reference=local(of(plan.setting, "reference")),
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
     output:
         aliasing=f"{HERE}tables/aliasing_energy.csv",
         wrong_blur=f"{HERE}tables/wrong_blur_identity.csv",

@@ -1,17 +1,17 @@
 """What a detector should find, and what it finds of it (figures truth, refinement, uncertainty).
 
 Comes in: views, tables of extrema and refinement traces. Goes out: truth/*.parquet, the true extrema
-of the view and of the scene, and tables/truth_*.csv, refinement_choices.csv, uncertainty_*.csv. Steps: climb from the
-discrete extrema of several samplings to the extrema of the continuous scale-space, by Newton's
-method on the full sums; evaluate detections against them: recall, precision, errors.
+of the view and of the scene, and tables/truth_*.csv, refinement_choices.csv, uncertainty_*.csv.
+Steps: climb from the discrete extrema of several samplings to the extrema of the continuous
+scale-space, by Newton's method on sums over its series; evaluate detections against them: recall,
+precision, errors.
 """
 
 
 rule find_true_extrema:
     """Find the true extrema of the view that all samplings sample, for one ratio of the blurs."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
     output:
         table=f"{HERE}truth/view{{ratio}}.parquet",
     log:
@@ -39,8 +39,7 @@ rule find_scene_extrema:
     """Find the true extrema of the scene, as a view of the whole of it should see them."""
     input:
         reference=local(of(plan.setting, "reference")),
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
     output:
         table=f"{HERE}truth/scene.parquet",
     log:
@@ -66,8 +65,7 @@ rule find_scene_extrema:
 rule evaluate_samplings:
     """Figure truth: recall, precision and errors of balanced samplings, with the spline."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         truth=f"{HERE}truth/view.parquet",
         samplings=files("keypoints/sampling_n{}.parquet", plan.setting, "samplings.n_spo"),
         traces=files("keypoints/traces_n{}.parquet", plan.setting, "samplings.n_spo"),
@@ -94,8 +92,7 @@ rule evaluate_samplings:
 
 use rule evaluate_samplings as evaluate_cosine with:
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         truth=f"{HERE}truth/view.parquet",
         samplings=files("keypoints/cosine_n{}.parquet", plan.setting, "truth.cosine_n_spo"),
         traces=files("keypoints/cosine_traces_n{}.parquet", plan.setting, "truth.cosine_n_spo"),
@@ -120,8 +117,7 @@ use rule evaluate_samplings as evaluate_cosine with:
 rule evaluate_grid:
     """Figure truth: recall and precision of discrete extrema on the grid of figure 3."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         truth=f"{HERE}truth/view.parquet",
         extrema=files("keypoints/grid_n{}.parquet", plan.setting, "grid.n_spo"),
     output:
@@ -146,8 +142,7 @@ rule evaluate_grid:
 rule evaluate_kappas:
     """Figure truth: recall, precision and errors for ratios of the two blurs."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         truths=files("truth/view{suffix}.parquet", plan.true_ratios),
         extrema=f"{HERE}keypoints/kappas_extrema.parquet",
         traces=f"{HERE}keypoints/kappas_traces.parquet",
@@ -175,13 +170,11 @@ rule evaluate_kappas:
 rule evaluate_views:
     """Figure truth: recall and precision of sets of views against the scene itself."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         truth=f"{HERE}truth/scene.parquet",
         sets=ancient(files("views/{set}", plan.compared_with_scene)),
         sets_digest=files("views/{set}.sha256", plan.compared_with_scene),
-        extrema=files("keypoints/{set}/extrema_n{n_spo}.parquet", plan.compared_with_scene),
-        traces=files("keypoints/{set}/traces_n{n_spo}.parquet", plan.compared_with_scene),
+        **detections(plan.compared_with_scene),
     output:
         table=f"{HERE}tables/truth_views.csv",
     log:
@@ -237,8 +230,7 @@ rule evaluate_keypoints:
 rule evaluate_refinement:
     """Figure refinement: what ways and limits of the refinement keep and lose."""
     input:
-        views=ancient(f"{HERE}views/still"),
-        views_digest=f"{HERE}views/still.sha256",
+        **views("still"),
         truth=f"{HERE}truth/view.parquet",
         samplings=files("keypoints/sampling_n{}.parquet", plan.refined_n_spo),
     output:
@@ -266,8 +258,7 @@ rule evaluate_refinement:
 rule calibrate_bars:
     """Figure uncertainty: what error bars of keypoints hold, and what they are good for."""
     input:
-        views=ancient(f"{HERE}views/shots"),
-        views_digest=f"{HERE}views/shots.sha256",
+        **views("shots"),
         moved=ancient(f"{HERE}views/moved"),
         moved_digest=f"{HERE}views/moved.sha256",
     output:

@@ -271,6 +271,7 @@ def _draw_causes(ax: Axes, causes: DataFrame, matching: str, named: bool) -> Non
     ax.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
     if named:
         place = {"transform": ax.transAxes, "fontsize": style.SMALL, "va": "center"}
+        place["bbox"] = {"facecolor": "white", "linewidth": 0, "pad": 0.5}  # over the paper's line
         for line, (cause, name) in enumerate(CAUSE_NAMES.items()):
             up, left = 0.96 - 0.085 * (line % 3), 0.36 if line < 3 else 0.70
             colour = palette.CHANGE_CAUSE_COLOURS[cause]

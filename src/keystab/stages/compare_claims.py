@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from keystab.stages._command import command
+from keystab.utils.stage_command import command
 
 
 @command

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from keystab.parameters import Acceptance, Compared, Scales
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import DifferenceOfGaussians, Stable, Tolerance
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command
@@ -23,7 +23,7 @@ def main(
     from keystab.experiments.local_volumes import cubes_around, dense_scale_space, drawn
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
-    from keystab.stages._tables import read_keypoints
+    from keystab.io.study_tables import read_keypoints
 
     columns = ["keypoint", "y", "x", "sigma", "sign", "stability"]
     unique = read_keypoints(keypoints, columns)

@@ -7,7 +7,7 @@ its neighbours, so that any is chosen afterwards. So it does of single precision
 from pathlib import Path
 
 from keystab.parameters import Arithmetic, Scales
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command

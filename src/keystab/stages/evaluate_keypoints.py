@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import ComparedWithTruth, Stable, Tolerance
-from keystab.stages._command import command
+from keystab.utils.stage_command import command
 
 
 @command
@@ -25,7 +25,7 @@ def main(
     from keystab.evaluation.stability import label
     from keystab.experiments.keypoint_causes import areas_of_labels, cause_table
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._tables import read_keypoints
+    from keystab.io.study_tables import read_keypoints
 
     unique = read_keypoints(keypoints, ["keypoint", "y", "x", "sigma", "sign", "stability"])
     low, high = (sigma_min * end for end in (compared.first_scale, compared.last_scale))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import ComparedWithTruth, DifferenceOfGaussians, Tolerance
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from keystab.stages._command import command
+from keystab.utils.stage_command import command
 
 
 @command

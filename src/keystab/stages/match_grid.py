@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import Compared, Same, Scales
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command
@@ -30,7 +30,7 @@ def main(
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling
     from keystab.stages._compared import inside
-    from keystab.stages._tables import read_extrema
+    from keystab.io.study_tables import read_extrema
 
     view = read_view(*views)
     common = inside(compared, scales.sigma_min, view.shape)

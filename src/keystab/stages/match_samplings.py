@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import Compared, Same, Scales, Stable
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command
@@ -29,7 +29,7 @@ def main(
     from keystab.io.view_store import read_view
     from keystab.matching.common_range import in_range
     from keystab.scalespace.sampling import balanced_delta
-    from keystab.stages._tables import read_extrema
+    from keystab.io.study_tables import read_extrema
 
     extrema, how = read_extrema(samplings), vars(same)
     shape = read_view(*views).shape

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import Compared, Readings, Same, Scales
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command
@@ -39,7 +39,7 @@ def main(
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import balanced_delta
     from keystab.stages._compared import inside
-    from keystab.stages._tables import write_joined
+    from keystab.io.study_tables import write_joined
 
     steps = {n: balanced_delta(n, scales.kappa, scales.sigma_min) for n in n_spo}
     rate_tables, summaries, crossings_of = [], [], []

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from keystab.parameters import Acceptance, ComparedInViews, Same
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command
@@ -44,7 +44,7 @@ def main(
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_views
     from keystab.stages._compared import common_range
-    from keystab.stages._tables import write_joined
+    from keystab.io.study_tables import write_joined
 
     seen = read_views(*views)
     everywhere = common_range(seen, compared, soft_ends)

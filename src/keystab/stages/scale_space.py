@@ -1,7 +1,7 @@
 """Store one balanced scale-space of a view."""
 
 from keystab.parameters import DifferenceOfGaussians
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command

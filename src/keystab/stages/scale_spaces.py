@@ -1,7 +1,7 @@
 """Store the scale-spaces of all views of a set at one sampling."""
 
 from keystab.parameters import ScaleSpaceOfViews
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import Stable
-from keystab.stages._command import command
+from keystab.utils.stage_command import command
 
 
 @command
@@ -23,7 +23,7 @@ def main(
     from keystab.experiments.feature_scores import score_features
     from keystab.experiments.sampling_stability import positions_of_matches
     from keystab.io.tables import read_table, write_table
-    from keystab.stages._tables import read_extrema, read_keypoints
+    from keystab.io.study_tables import read_extrema, read_keypoints
 
     unique = read_keypoints(keypoints, ["keypoint", "stability"])
     extrema = read_extrema(samplings)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import Compared, Folds, Same, Scales, Stable
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command
@@ -33,7 +33,7 @@ def main(
     from keystab.io.view_store import read_view
     from keystab.scalespace.continuous_dog import DogSeries
     from keystab.stages._compared import inside
-    from keystab.stages._tables import read_extrema, read_keypoints
+    from keystab.io.study_tables import read_extrema, read_keypoints
     from keystab.utils.progress import progress
 
     ends = (scales.sigma_min * compared.first_scale, scales.sigma_min * end)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from keystab.parameters import Semigroup
-from keystab.stages._command import command
+from keystab.utils.stage_command import command
 
 
 @command

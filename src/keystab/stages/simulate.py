@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from keystab.parameters import Camera, Reference
-from keystab.stages._command import Store, command
+from keystab.utils.stage_command import Store, command
 
 
 @command

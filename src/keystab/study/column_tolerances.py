@@ -85,7 +85,7 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
         ".*",
         "n_spo delta_min kappa blur step noise blur_spread sigma_from seen_by max_offset c level "
         "max_iterations sigma sigma_min pitch f_number w20 w40 wavelength fill_factor camera_blur "
-        "assumed_blur theory radius epsilon limit",
+        "assumed_blur theory radius epsilon limit tilt zoom factor",
         SET,
     ),
     (".*", _SHARES, COUNTED),
@@ -108,8 +108,8 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     ("fig5_(roc|thresholds)", "threshold", Allowed(CONDITION.relative, STEPWISE.absolute)),
     ("fig6", "level", GREY),
     ("fig6_cubes", "value", GREY),
-    ("fig(7|8|S1)_precision", "mean median low high low_median high_median", SPREAD),
-    ("fig(7|8|S1)_differences", "value other difference", COUNTED),
+    ("fig(7|8|S1|S5)_precision", "mean median low high low_median high_median", SPREAD),
+    ("fig(7|8|S1|S5)_differences", "value other difference", COUNTED),
     ("fig7_edges", "along across low_along high_along low_across high_across", SPREAD),
     ("fig9_keypoints", "y x sigma scale_slope", PLACE),
     ("fig12_theory", "dog_noise octave_ratio gaussian_noise gaussian_octave_ratio", SOLVED),
@@ -122,6 +122,12 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     ("predictors_detections", "y x sigma keypoint_y keypoint_x", PLACE),
     ("predictors_detections", "eigenvalue edge degeneracy saddle annulus end persistence", SPREAD),
     ("predictors_detections", "(stability|inside|truth)_.*", LEARNT),
+    ("aliasing_energy", "contrast dog aliased.*", SOLVED),
+    ("reference_noise", "noise_.*", SOLVED),
+    ("reference_noise", "distance scale_shift q25_shift q75_shift", SPREAD),
+    ("wrong_blur_identity", "assumed dilated", SET),
+    ("wrong_blur_identity", "difference undilated", SOLVED),  # the largest of all grey values
+    ("zoomed_truth", "(scale|location)_residual (q95|low|high)_(scale|location)", SPREAD),
     (
         "truth_.*|refinement_choices",
         "median_location p90_location rms_location median_scale p90_scale rms_scale",

@@ -178,6 +178,13 @@ class Rules:
 
         return paths_of
 
+    def detections(self, searches: Callable[..., Any], *arguments: Any) -> dict[str, OfJob]:
+        """Input of a rule: extrema of the searches that a function says, and their traces."""
+        return {
+            name: self.files(f"keypoints/{{set}}/{name}_n{{n_spo}}.parquet", searches, *arguments)
+            for name in ("extrema", "traces")
+        }
+
     def placed(self, function: Callable[..., Any], *arguments: Any) -> OfJob:
         """What a function says of the place of the job's scene."""
 

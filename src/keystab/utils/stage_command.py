@@ -62,7 +62,7 @@ def command(function: Callable[..., None]) -> Callable[..., int]:
     def run(argv: Sequence[str] | None = None) -> int:
         if argv is None:
             settle_process()
-        arguments = read_arguments(function, argv, meanings())
+        arguments = read_arguments(function, argv, meanings(function))
         try:
             require_start()
             if "NUMBA_CACHE_DIR" not in os.environ:
@@ -103,8 +103,9 @@ def settle_process() -> None:
     atexit.register(gc.freeze)
 
 
-def meanings() -> dict[str, str]:
-    """What the arguments of stages mean, from the docstring of the package."""
-    lines = (sys.modules[__package__].__doc__ or "").splitlines()
+def meanings(function: Callable[..., None]) -> dict[str, str]:
+    """What the arguments of a stage mean, from the docstring of its package."""
+    package = sys.modules[sys.modules[function.__module__].__package__ or ""]
+    lines = (package.__doc__ or "").splitlines()
     pairs = (line.split(" : ", 1) for line in lines if " : " in line)
     return {name.strip(): meaning for name, meaning in pairs}
