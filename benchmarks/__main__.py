@@ -107,7 +107,9 @@ def sizes(largest: int) -> pd.DataFrame:
     rows = []
     for side in (200, 400, 800, 1600, 3200):
         if side <= largest:
-            rows.append(measure("keystab, spline", view(side, side), repeats=3 if side < 1600 else 1))
+            rows.append(
+                measure("keystab, spline", view(side, side), repeats=3 if side < 1600 else 1)
+            )
             rows[-1]["us_per_pixel"] = 1e6 * rows[-1]["seconds"] / side**2
             print(f"{side} x {side}: {rows[-1]['us_per_pixel']:.2f} us per pixel", flush=True)
     return pd.DataFrame(rows)
@@ -228,7 +230,10 @@ def report(tables: dict[str, pd.DataFrame]) -> str:
         "truth": ("True extrema of one octave", lambda table: ["", *markdown(table, TRUTH)]),
         "phases": (
             "Jobs of the study by rule, those of more than a hundredth of all",
-            lambda table: ["", *markdown(table[table["seconds"] > table["seconds"].sum() / 100], PHASES)],
+            lambda table: [
+                "",
+                *markdown(table[table["seconds"] > table["seconds"].sum() / 100], PHASES),
+            ],
         ),
     }
     for name, (title, words) in about.items():

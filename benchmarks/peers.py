@@ -47,7 +47,9 @@ def same_grid(grid: Grid) -> dict[str, Peer]:
     opencv = {"nOctaveLayers": n, **NO_FILTERS}
     return {
         "OpenCV": Peer("opencv", "same", "same", opencv | {"sigma": grid.sigma_min}, "half"),
-        "OpenCV, its scales": Peer("opencv", "same", "1.6 samples", opencv | {"sigma": 1.6}, "half"),
+        "OpenCV, its scales": Peer(
+            "opencv", "same", "1.6 samples", opencv | {"sigma": 1.6}, "half"
+        ),
         "VLFeat": Peer(
             *("vlfeat", "same", "1.6 samples"),
             {"n_levels": n, "n_octaves": 1, "first_octave": 0, "peak_thresh": 0.0}

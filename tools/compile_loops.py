@@ -9,6 +9,7 @@ import shutil
 from pathlib import Path
 
 from keystab.provenance.code_digest import PACKAGE_FOLDER, folder_of_loops, modules_of_loops
+from keystab.utils.compiled_loops import forget_outdated
 
 
 def copy_beside_modules(loops: Path, package_folder: Path) -> None:
@@ -24,6 +25,7 @@ def copy_beside_modules(loops: Path, package_folder: Path) -> None:
     package_folder : Path
         Folder of the package, whose modules get their loops in a ``__pycache__`` beside them.
     """
+    forget_outdated(package_folder)  # and not those that come now, when the library is used first
     for module in modules_of_loops(package_folder):
         path = package_folder.joinpath(*module.split(".")[1:])
         for kind in ("nbc", "nbi"):  # an index comes after what it names

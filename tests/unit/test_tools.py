@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from keystab.utils.compiled_loops import forget_outdated
+
 TOOLS = Path(__file__).parents[2] / "tools"
 
 
@@ -43,4 +45,5 @@ def test_loops_that_the_set_up_compiled_are_found_beside_their_module(room, tmp_
 
     assert said(NUMBA_CACHE_DIR=str(loops)) == "compiled"
     importlib.import_module("compile_loops").copy_beside_modules(loops, package)
+    assert not forget_outdated(package)  # what every first use of the library asks
     assert said() == ""

@@ -21,9 +21,9 @@ def main(
 ) -> None:
     """Read the view and the unique keypoints; write a table of cubes and one of their samples."""
     from keystab.experiments.local_volumes import cubes_around, dense_scale_space, drawn
+    from keystab.io.study_tables import read_keypoints
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
-    from keystab.io.study_tables import read_keypoints
 
     columns = ["keypoint", "y", "x", "sigma", "sign", "stability"]
     unique = read_keypoints(keypoints, columns)

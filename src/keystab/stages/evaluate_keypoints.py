@@ -24,8 +24,8 @@ def main(
     from keystab.evaluation import recall_precision
     from keystab.evaluation.stability import label
     from keystab.experiments.keypoint_causes import areas_of_labels, cause_table
-    from keystab.io.tables import read_table, write_table
     from keystab.io.study_tables import read_keypoints
+    from keystab.io.tables import read_table, write_table
 
     unique = read_keypoints(keypoints, ["keypoint", "y", "x", "sigma", "sign", "stability"])
     low, high = (sigma_min * end for end in (compared.first_scale, compared.last_scale))

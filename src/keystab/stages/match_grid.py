@@ -26,11 +26,11 @@ def main(
     import pandas as pd
 
     from keystab.experiments.sampling_stability import count_sampling, ratio_columns
+    from keystab.io.study_tables import read_extrema
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import Sampling
     from keystab.stages._compared import inside
-    from keystab.io.study_tables import read_extrema
 
     view = read_view(*views)
     common = inside(compared, scales.sigma_min, view.shape)

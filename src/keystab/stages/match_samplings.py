@@ -25,11 +25,11 @@ def main(
 ) -> None:
     """Read the extrema of all samplings; write matches and the tables of figure 4."""
     from keystab.experiments import sampling_stability as tables
+    from keystab.io.study_tables import read_extrema
     from keystab.io.tables import write_table
     from keystab.io.view_store import read_view
     from keystab.matching.common_range import in_range
     from keystab.scalespace.sampling import balanced_delta
-    from keystab.io.study_tables import read_extrema
 
     extrema, how = read_extrema(samplings), vars(same)
     shape = read_view(*views).shape

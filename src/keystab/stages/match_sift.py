@@ -27,10 +27,10 @@ def main(
     from keystab.detection.sift_filters import passes_filters
     from keystab.experiments.filtered_keypoints import edge_spreads, kept_by_filters
     from keystab.experiments.view_stability import count_table, curve_table, keypoints_of_views
+    from keystab.io.study_tables import write_joined
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_views
     from keystab.stages._compared import common_range
-    from keystab.io.study_tables import write_joined
 
     seen = read_views(*views)
     everywhere = common_range(seen, compared, soft_ends)

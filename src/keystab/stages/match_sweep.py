@@ -40,10 +40,10 @@ def main(
         keypoints_of_views,
         scale_table,
     )
+    from keystab.io.study_tables import write_joined
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_views
     from keystab.stages._compared import common_range
-    from keystab.io.study_tables import write_joined
 
     if (octaves is None) != (scales is None):
         raise InputError("--starts, --seen-by and --scales go together: give all or none")

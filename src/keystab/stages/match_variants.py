@@ -35,11 +35,11 @@ def main(
 
     from keystab.experiments import change_causes, floor_readings, sampling_stability
     from keystab.experiments.view_stability import labelled
+    from keystab.io.study_tables import write_joined
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
     from keystab.scalespace.sampling import balanced_delta
     from keystab.stages._compared import inside
-    from keystab.io.study_tables import write_joined
 
     steps = {n: balanced_delta(n, scales.kappa, scales.sigma_min) for n in n_spo}
     rate_tables, summaries, crossings_of = [], [], []

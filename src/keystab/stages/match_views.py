@@ -41,10 +41,10 @@ def main(
         of_views,
         parts_by,
     )
+    from keystab.io.study_tables import write_joined
     from keystab.io.tables import read_table
     from keystab.io.view_store import read_views
     from keystab.stages._compared import common_range
-    from keystab.io.study_tables import write_joined
 
     seen = read_views(*views)
     everywhere = common_range(seen, compared, soft_ends)

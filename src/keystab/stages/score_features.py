@@ -22,8 +22,8 @@ def main(
     """Read keypoints, matches and extrema; write the tables of figure 5."""
     from keystab.experiments.feature_scores import score_features
     from keystab.experiments.sampling_stability import positions_of_matches
-    from keystab.io.tables import read_table, write_table
     from keystab.io.study_tables import read_extrema, read_keypoints
+    from keystab.io.tables import read_table, write_table
 
     unique = read_keypoints(keypoints, ["keypoint", "stability"])
     extrema = read_extrema(samplings)

@@ -29,11 +29,11 @@ def main(
 ) -> None:
     """Read what is known of every scene, `samplings` scene by scene; write the tables."""
     from keystab.experiments.predictor_scores import described, score_predictors
+    from keystab.io.study_tables import read_extrema, read_keypoints
     from keystab.io.tables import read_table, write_table
     from keystab.io.view_store import read_view
     from keystab.scalespace.continuous_dog import DogSeries
     from keystab.stages._compared import inside
-    from keystab.io.study_tables import read_extrema, read_keypoints
     from keystab.utils.progress import progress
 
     ends = (scales.sigma_min * compared.first_scale, scales.sigma_min * end)

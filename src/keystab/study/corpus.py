@@ -6,6 +6,7 @@ Each row of ``config/scenes.csv`` is a photograph, whose file it names, or a sce
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,7 +14,6 @@ from typing import Any, NamedTuple
 
 from keystab.camera.made_scenes import KINDS, SHAPE
 from keystab.errors import InputError
-from keystab.io.tables import read_table
 
 __all__ = ["COLUMNS", "PHOTOGRAPH", "CorpusScene", "judged", "places", "read_corpus", "with_corpus"]
 
@@ -78,13 +78,8 @@ def read_corpus(path: Path | str) -> dict[str, CorpusScene]:
     InputError
         If it cannot be read, or a row is not right: the row and what is allowed are named.
     """
-    table = read_table(path, COLUMNS)
     scenes: dict[str, CorpusScene] = {}
-    for number, row in enumerate(table.to_dict("records"), 1):
-        texts = {
-            name: "" if row[name] != row[name] else str(row[name])
-            for name in ("name", "family", "kind", "path", "sha256", "credit")
-        }
+    for number, texts in enumerate(_rows(path), 1):
         where = f"{path}: row {number} ({texts['name'] or 'no name'})"
         if not _NAME.fullmatch(texts["name"]) or texts["name"] in scenes:
             raise InputError(f"{where}: give each scene a name of its own, of a-z, 0-9 and _")
@@ -102,23 +97,38 @@ def read_corpus(path: Path | str) -> dict[str, CorpusScene]:
         if not _DIGEST.fullmatch(texts["sha256"]):
             raise InputError(f"{where}: sha256 {texts['sha256']!r}: give 64 hexadecimal digits")
         scenes[texts["name"]] = CorpusScene(
-            texts["name"], texts["family"], texts["kind"], *_numbers(row, where), texts["path"],
+            texts["name"], texts["family"], texts["kind"], *_numbers(texts, where), texts["path"],
             texts["sha256"], texts["credit"],
         )  # fmt: skip
     return scenes
 
 
-def _numbers(row: Mapping[Any, Any], where: str) -> tuple[int, float, float]:
+def _rows(path: Path | str) -> list[dict[str, str]]:
+    """Rows of the table, without pandas: every plan of the study reads it."""
+    try:
+        with Path(path).open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file, restval="", strict=True))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; give a table of scenes") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: not a readable .csv table: {error}") from None
+    missing = [name for name in COLUMNS if not rows or name not in rows[0]]
+    if missing:
+        raise InputError(f"{path}: lacks the column {missing[0]}, or has no row")
+    return rows
+
+
+def _numbers(texts: Mapping[str, str], where: str) -> tuple[int, float, float]:
     try:
         seed, exponent, angle = (
-            0.0 if row[name] != row[name] else float(row[name])
-            for name in ("seed", "exponent", "angle")
+            float(texts[name] or 0.0) for name in ("seed", "exponent", "angle")
         )
-    except (TypeError, ValueError):
+        whole = int(seed)
+    except (ValueError, OverflowError):
         raise InputError(f"{where}: seed, exponent and angle are numbers or empty") from None
-    if seed != int(seed) or seed < 0:
+    if seed != whole or seed < 0:
         raise InputError(f"{where}: seed {seed:g}: give a whole number of at least 0")
-    return int(seed), exponent, angle
+    return whole, exponent, angle
 
 
 def with_corpus(

@@ -37,7 +37,7 @@ def by_place(
     Examples
     --------
     >>> place_pattern({"": {}, "scenes/stream/": {}, "scenes/roof/": {}})
-    '(scenes/stream/|scenes/roof/)?'
+    '(scenes/(?:stream|roof)/)?'
     """
     others = dict.fromkeys([*further_pictures(settings, folder), *settings["floor"]["pictures"]])
     named = {**settings["floor"]["pictures"], **settings["predictors"]["pictures"]}
@@ -52,8 +52,9 @@ def by_place(
 
 
 def place_pattern(places: Iterable[str]) -> str:
-    """Regular expression for the places of scenes."""
-    return f"({'|'.join(place for place in places if place)})?"
+    """Regular expression for the places of scenes; short, for every output's is compiled."""
+    names = [place.split("/")[1] for place in places if place]
+    return f"(scenes/(?:{'|'.join(names)})/)?" if names else "()"
 
 
 def further_pictures(settings: Settings, folder: Path | str = ".") -> list[str]:
