@@ -10,10 +10,11 @@ ARCHIVE ?=
 RECOMPUTE ?=
 
 # What a person's own variables say to the shell, Python, pip and Snakemake is for other projects:
-# with them another library, other packages or other settings would be taken.
+# with them another library, other packages or other settings would be taken, or every job would
+# compile all modules again.
 unexport CDPATH BASH_ENV ENV PYTHONPATH PYTHONHOME PYTHONSTARTUP PYTHONUSERBASE PYTHONPLATLIBDIR \
     PYTHONWARNINGS PYTHONOPTIMIZE PYTHONSAFEPATH PYTHONINSPECT PYTHONCASEOK PYTHONEXECUTABLE \
-    PYTHONUTF8 PYTHONIOENCODING VIRTUAL_ENV
+    PYTHONUTF8 PYTHONIOENCODING PYTHONDONTWRITEBYTECODE VIRTUAL_ENV
 export PYTHONNOUSERSITE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 

@@ -8,7 +8,10 @@ from types import ModuleType
 
 import numpy as np
 import pandas as pd
+import pytest
 from matplotlib.figure import Figure
+
+from keystab.figures import style
 
 GRID = (3, 4, 6, 10, 19)
 """Samplings of figure 3's grid: fewer than the study's, which only take longer to draw."""
@@ -30,6 +33,14 @@ def tables(n: int | str) -> dict[str, pd.DataFrame]:
 def drawn(n: int | str) -> tuple[dict[str, pd.DataFrame], Figure]:
     """Return the tables of figure `n` and the figure, drawn once for all tests."""
     return tables(n), module(n).draw(tables(n))
+
+
+@cache
+def without_layout(n: int | str) -> tuple[dict[str, pd.DataFrame], Figure]:
+    """Return the same without having computed where things go, half of the time of drawing."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(style, "settle", lambda figure, draft=False: figure)
+        return tables(n), module(n).draw(tables(n))
 
 
 def module(n: int | str) -> ModuleType:

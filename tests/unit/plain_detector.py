@@ -58,9 +58,9 @@ def dct_scale_space(image, camera_blur, n_spo, delta_min, sigma_min, kappa):
     return np.stack([blurred(kappa * sigma) - blurred(sigma) for sigma in scales])
 
 
-def discrete_extrema(dog, epsilon):
-    """Set of (s, row, column, sign)."""
-    found = set()
+def margins(dog):
+    """By how much each discrete extremum (s, row, column, sign) exceeds its nearest neighbour."""
+    found = {}
     for s in range(1, dog.shape[0] - 1):
         for i in range(1, dog.shape[1] - 1):
             for j in range(1, dog.shape[2] - 1):
@@ -69,12 +69,20 @@ def discrete_extrema(dog, epsilon):
                     sign = 1
                 else:
                     sign = -1
+                least = np.inf
                 for a, b, c in STEPS:
-                    if not sign * (value - dog[s + a, i + b, j + c]) > epsilon:
+                    difference = sign * (value - dog[s + a, i + b, j + c])
+                    if not difference > 0:
                         break
+                    least = min(least, difference)
                 else:
-                    found.add((s, i, j, sign))
+                    found[s, i, j, sign] = least
     return found
+
+
+def discrete_extrema(dog, epsilon):
+    """Set of (s, row, column, sign)."""
+    return {place for place, margin in margins(dog).items() if margin > epsilon}
 
 
 def refine(dog, s, i, j, max_offset, max_iterations, scale_moves, move):

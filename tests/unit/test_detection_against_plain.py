@@ -48,8 +48,9 @@ def plain_spaces(texture):
 @pytest.fixture(scope="module")
 def plain_extrema(plain_spaces):
     return {
-        (sampling, epsilon): plain.discrete_extrema(dog, epsilon)
+        (sampling, epsilon): {place for place, margin in found.items() if margin > epsilon}
         for sampling, dog in plain_spaces.items()
+        for found in [plain.margins(dog)]
         for epsilon in EPSILONS
     }
 

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from keystab import __version__, scale_space
 from keystab.camera.views import ViewSpec
 from keystab.cli.parser import build_parser
 from keystab.io.scale_space_store import write_scale_space
 from keystab.io.view_store import write_views
+from keystab.study.plain_yaml import read_plain_yaml
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(
@@ -121,7 +121,7 @@ def test_no_job_at_a_time_is_refused():
 
 
 def test_settings_of_deviations_exist():
-    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+    schema = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
     known = settings(schema)
     rows = [line.split(" | ") for line in text_of("DEVIATIONS.md").splitlines() if " | " in line]
     named = [name for row in rows for name in re.findall(r"`([\w.]+)` *[|,]", ", " + row[-1] + "|")]

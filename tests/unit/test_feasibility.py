@@ -6,14 +6,14 @@ import copy
 from pathlib import Path
 
 import pytest
-import yaml
 
 from keystab.camera.view_sets import per_view, view_shapes, view_specs
 from keystab.errors import InputError
 from keystab.study import feasibility, picture_checks, settings
+from keystab.study.plain_yaml import read_plain_yaml
 
 ROOT = Path(__file__).parents[2]
-SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+SCHEMA = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
 DEFAULTS = settings.completed({}, SCHEMA)
 
 

@@ -4,7 +4,8 @@ import figure_tables
 import numpy as np
 import pandas as pd
 import pytest
-from figure_tables import GRID, drawn
+from figure_tables import GRID
+from figure_tables import without_layout as drawn
 from matplotlib.colors import to_rgb
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -30,6 +31,12 @@ from keystab.figures import (
     style,
 )
 from keystab.figures.style import spread
+
+
+@pytest.fixture(autouse=True)
+def without_layout(monkeypatch):
+    """Leave out where things go, which takes half of the time of drawing and changes no number."""
+    monkeypatch.setattr(style, "settle", lambda figure, draft=False: figure)
 
 
 def panel(figure, name):

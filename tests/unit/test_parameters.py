@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import get_args, get_type_hints
 
 import pytest
-import yaml
 
 from keystab import parameters, stages
+from keystab.study.plain_yaml import read_plain_yaml
 from keystab.utils.stage_command import meanings
 
 ROOT = Path(__file__).parents[2]
-SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+SCHEMA = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
 BLOCKS = [
     block
     for block in vars(parameters).values()

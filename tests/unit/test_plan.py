@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from keystab.camera.view_sets import per_view, view_shapes, view_specs
 from keystab.study import floor_variants, job_resources, plan, scenes, settings
+from keystab.study.plain_yaml import read_plain_yaml
 
 ROOT = Path(__file__).parents[2]
-SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+SCHEMA = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
 GIVEN = settings.read_yaml(ROOT / "config/config.yaml")
 REFERENCE_SHAPE = (2250, 4000)
 

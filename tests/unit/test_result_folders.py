@@ -7,14 +7,14 @@ import re
 from pathlib import Path
 
 import pytest
-import yaml
 
 from keystab.errors import InputError
 from keystab.study import feasibility, settings
+from keystab.study.plain_yaml import read_plain_yaml
 from keystab.study.result_folders import normal_folder, path_problems
 
 ROOT = Path(__file__).parents[2]
-SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+SCHEMA = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
 GIVEN = settings.read_yaml(ROOT / "config/config.yaml")
 
 

@@ -12,9 +12,10 @@ import yaml
 
 from keystab.errors import InputError
 from keystab.study import settings
+from keystab.study.plain_yaml import read_plain_yaml
 
 ROOT = Path(__file__).parents[2]
-SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+SCHEMA = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
 
 
 def leaves(schema: dict, name: str = ""):

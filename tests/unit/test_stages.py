@@ -13,7 +13,6 @@ from keystab.figures import _render, fig4
 from keystab.io.pictures import pixel_digest, write_picture
 from keystab.io.tables import read_table
 from keystab.stages import (
-    _command,
     count_refined,
     cut_cubes,
     detect,
@@ -26,10 +25,11 @@ from keystab.stages import (
     score_predictors,
     simulate,
 )
+from keystab.utils.stage_command import command
 
 STAGES = sorted(
     path.stem
-    for path in (Path(_command.__file__).parent).glob("*.py")
+    for path in (Path(detect.__file__).parent).glob("*.py")
     if not path.stem.startswith("_")
 )
 DETECTOR = ["--sigma-min", "1.1", "--kappa", "1.2599210498948732", "--oversampling", "spline"]
@@ -364,7 +364,7 @@ def test_blur_of_the_reference_adds_to_that_of_the_camera(reference, tmp_path):
     ],
 )  # fmt: skip
 def test_machines_at_their_limits_get_one_line(error, line, capsys):
-    @_command.command
+    @command
     def main():
         raise error
 
@@ -373,7 +373,7 @@ def test_machines_at_their_limits_get_one_line(error, line, capsys):
 
 
 def test_defects_keep_their_traceback():
-    @_command.command
+    @command
     def main():
         raise ZeroDivisionError
 

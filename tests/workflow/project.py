@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PARTS = ["Snakefile", "workflow", "profiles", "config", "src", "audit.lock", "environment.lock"]
-IMPORTED_LATE = ("PIL.PngImagePlugin", "smart_open", "snakemake.storage")
+IMPORTED_LATE = ("PIL.PngImagePlugin", "jsonschema", "smart_open", "snakemake.storage")
 QUICK = ("--configfile", "config/quick.yaml")
 
 

@@ -476,6 +476,7 @@ def test_the_crate_describes_every_file_and_the_run(packed):
                     assert name in entities or re.match("https?://", name)
 
 
+@pytest.mark.slow
 def test_the_real_study_is_finished_without_its_intermediate_files(touched, tmp_path):
     study = Study(touched.folder, ["config/quick.yaml"])
     contents = archive.Contents.of(study)

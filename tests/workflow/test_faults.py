@@ -294,6 +294,7 @@ def in_own_mounts(
     return run
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_named_and_the_rest_is_done_when_there_is_room(small_finished):
     folder = small_finished.folder
     expected = results(small_finished)

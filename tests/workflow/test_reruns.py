@@ -96,12 +96,13 @@ def slow(*values):
         ("src/keystab/figures/palette.py", '"condition": "#A8458A"', '"condition": "#A8458B"', {"fig5"}),
         slow("src/keystab/figures/fig5.py", "PANELS = {", "MORE = 1\nPANELS = {", {"fig5"}),
         slow("src/keystab/figures/style.py", "from __future__", "import os\nfrom __future__", FIGURES),
-        ("src/keystab/camera/simulation.py", *MORE, SIMULATION),
-        # The contract for code: what depends on it, and nothing else.
+        slow("src/keystab/camera/simulation.py", *MORE, SIMULATION),
+        # The contract for code: what depends on it, and nothing else. Of all modules it is tried by
+        # their digests, in test_reruns_table.py.
         ("src/keystab/evaluation/intervals.py", *MORE, MATCHING | EVALUATING | BARS | {"count_refined", "view_statements"}),
-        ("src/keystab/evaluation/recall_precision.py", *MORE, EVALUATING | VARIANTS),
-        ("src/keystab/detection/sift_filters.py", *MORE, {"match_sift", "fig7"}),
-        ("src/keystab/utils/validation.py", *MORE, EVERYTHING - {"simulate", "describe_views", "semigroup", "crop_views", "fig1", "fig2"}),
+        slow("src/keystab/evaluation/recall_precision.py", *MORE, EVALUATING | VARIANTS),
+        slow("src/keystab/detection/sift_filters.py", *MORE, {"match_sift", "fig7"}),
+        slow("src/keystab/utils/validation.py", *MORE, EVERYTHING - {"simulate", "describe_views", "semigroup", "crop_views", "fig1", "fig2"}),
         slow("src/keystab/parameters.py", "        str | None, Setting(\"reference_sha256\"", "        None | str, Setting(\"reference_sha256\"", SIMULATION),
         ("environment.lock", "numpy==", "numpy==99.", EVERYTHING),
     ],
@@ -131,9 +132,9 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("refinement: {max_offset: 0.7}", {"count_refined", "view_statements"} | VIEWS | SWEEPS | KAPPAS | BLOBS | ACCEPTING),
-        ("refinement: {move: unit_step}", DETECTION - {"detect_grid", "evaluate_grid", "detect_variant"} - VARIANTS - BARS),
-        ("comparison: {match_sign: true}", MATCHING | {"view_statements"}),
+        slow("refinement: {max_offset: 0.7}", {"count_refined", "view_statements"} | VIEWS | SWEEPS | KAPPAS | BLOBS | ACCEPTING),
+        slow("refinement: {move: unit_step}", DETECTION - {"detect_grid", "evaluate_grid", "detect_variant"} - VARIANTS - BARS),
+        slow("comparison: {match_sign: true}", MATCHING | {"view_statements"}),
         ("comparison: {soft_ends: true}", MATCHING - {"match_grid", "fig3", "match_blurs"} - VARIANTS),
         slow("comparison: {last_scale: 2.0}", ({"count_refined", "view_statements", "match_unbalanced"} | SAMPLINGS | VIEWS | SWEEPS | VARIANTS) - {"match_large_scales", "match_blur_zooms", "figS5"}),
         slow("comparison: {scale_ratio: 1.5}", MATCHING | EVALUATING | {"view_statements"}),
@@ -155,7 +156,7 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("stability: {n_resamples: 200}", VIEWS | STATED | {"match_sweep", "match_aliasing", "fig10", "fig11", "fig12"}),
         slow("stability: {max_offsets: [0.6, 1.0]}", {"match_views", "fig7", "evaluate_refinement", "refinement"}),
         slow("shipped: {contrast: 0.02}", {"match_sift", "fig7"}),
-        ("kappas: {fractions: [2, 3, 10]}", {"detect_kappas", "evaluate_kappas", "truth"} | KAPPAS),
+        slow("kappas: {fractions: [2, 3, 10]}", {"detect_kappas", "evaluate_kappas", "truth"} | KAPPAS),
         slow("stated: {zooms: [1.6]}", {"view_statements"}),
         slow("sets: {tilts: {focal_length: 330}}", {"simulate", "detect_views", "match_views", "figS5"}),
         slow("sets: {zooms: {zoom: 1.4}}", {"simulate", "detect_views", "match_views", "match_translations", "fig8"}),

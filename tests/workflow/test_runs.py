@@ -24,6 +24,7 @@ def tiny(project, keep: str = "false", sha: str = SHA) -> tuple[str, str]:
     return ("--configfile", "config/tiny.yaml")
 
 
+@pytest.mark.slow
 def test_detections_of_a_stored_scale_space(project):
     target = "results/tiny/keypoints/sampling_n3.parquet"
     run = project.snakemake(*tiny(project, "[3]"), "--printshellcmds", "--", target)

@@ -20,7 +20,7 @@ from keystab.errors import InputError
 from keystab.provenance.study_folder import settings_digest
 from keystab.provenance.unpacking import Unpacked
 from keystab.study.feasibility import every_set
-from keystab.study.plain_yaml import plain_yaml
+from keystab.study.plain_yaml import plain_yaml, read_plain_yaml
 from keystab.study.settings import Settings, checked, merge, read_yaml
 
 __all__ = [
@@ -96,9 +96,7 @@ def settings_of(archive: Unpacked, project: Path) -> ArchivedSettings:
             raise InputError(f"{name[:80]!a}: no file of settings of this archive")
         merge(given, plain_settings((archive.folder / name).read_bytes(), name))
     own = read_yaml(project / "config/config.yaml")
-    schema = yaml.safe_load(
-        (project / "workflow/schemas/config.schema.yaml").read_text(encoding="utf-8")
-    )
+    schema = read_plain_yaml(project / "workflow/schemas/config.schema.yaml")
     for key in ("results", "figures", "logs"):
         folder = getattr(archive.about, key)
         if given.get(key, folder) != folder:

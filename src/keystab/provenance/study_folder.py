@@ -11,11 +11,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import yaml
-
 from keystab.errors import InputError
 from keystab.provenance.imported_software import software_digest
 from keystab.provenance.shielded_environment import shielded
+from keystab.study.plain_yaml import read_plain_yaml
 from keystab.study.settings import Settings, checked, read_yaml
 
 __all__ = ["Output", "Study", "find_project", "jobs_and_reasons", "settings_digest"]
@@ -77,7 +76,7 @@ class Study:
         files = [self.project / overlay for overlay in self.overlays]
         given = read_yaml(self.project / "config/config.yaml", *files)
         schema = self.project / "workflow/schemas/config.schema.yaml"
-        self.settings: Settings = checked(given, yaml.safe_load(schema.read_text(encoding="utf-8")))
+        self.settings: Settings = checked(given, read_plain_yaml(schema))
         self.results, self.figures, self.logs = (str(self.settings[key]) for key in _FOLDERS)
 
     @property

@@ -105,7 +105,7 @@ def settle_process() -> None:
 
 def meanings(function: Callable[..., None]) -> dict[str, str]:
     """What the arguments of a stage mean, from the docstring of its package."""
-    package = sys.modules[sys.modules[function.__module__].__package__ or ""]
-    lines = (package.__doc__ or "").splitlines()
+    package = sys.modules.get(sys.modules[function.__module__].__package__ or "")
+    lines = (getattr(package, "__doc__", None) or "").splitlines()
     pairs = (line.split(" : ", 1) for line in lines if " : " in line)
     return {name.strip(): meaning for name, meaning in pairs}
