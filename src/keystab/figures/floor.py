@@ -298,10 +298,11 @@ def _draw_rates(ax: Axes, rates: DataFrame, names: Mapping[str, str]) -> None:
         up = {"epsilon_1e7": 4.0, "usual": -4.0}.get(name, 0.0)  # these two all but coincide
         style.direct_label(ax, n_spo[-1], rate[-1], text, colour, right=5.0, up=up, ha="left")
     ax.axhline(10.0, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=1)
-    style.direct_label(ax, 3.0, 10.0, "paper", palette.GREY, up=-5.0, ha="left")
     ax.set_ylim(bottom=0.0)
     samplings = np.unique(rates["n_spo"])
-    ax.set_xlim(samplings[0] - 0.5, samplings[-1] + 0.28 * (samplings[-1] - samplings[0]))
+    end = samplings[-1] + 0.28 * (samplings[-1] - samplings[0])
+    ax.set_xlim(samplings[0] - 0.5, end)
+    style.direct_label(ax, end, 10.0, "paper", palette.GREY, up=-5.0, ha="right")
     style.sampling_axis(ax, samplings)
     ax.set_ylabel("new extrema (%)")
     style.finish_axes(ax)
