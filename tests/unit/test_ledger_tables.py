@@ -88,6 +88,22 @@ def test_ratios_of_samplings_are_to_sifts_and_missing_without_it():
     assert ratio_columns(counted[1:])["extrema_ratio"].isna().all()
 
 
+def test_a_range_that_halves_all_samplings_alike_reduces_no_ratio():
+    """Half of the extrema are comparable at two samplings, a quarter at the third."""
+    counted = []
+    for n_spo, delta_min, n, kept in ((3, 0.5, 400, 200), (5, 0.3, 600, 300), (7, 0.2, 600, 150)):
+        table = extrema(n)
+        one = count_sampling(table, table[:kept], SAME)
+        numbers = {"n_spo": n_spo, "delta_min": delta_min, "balanced": False} | one.numbers
+        counted.append(one._replace(numbers=numbers))
+    table = ratio_columns(counted)
+    assert table["range_drop"].tolist() == [0.0, 0.0, 0.75]
+    assert table["low_range"][0] == table["high_range"][0] == 0.0
+    assert table["low_range"][1] < 0 < table["high_range"][1]
+    assert 0 < table["low_range"][2] < 0.75 < table["high_range"][2]
+    assert ratio_columns(counted[1:])["range_drop"].isna().all()
+
+
 def test_changes_count_how_often_a_keypoint_comes_or_goes():
     """One keypoint seen by samplings 3, 5 and 6 of five, another by all."""
     steady = [{"y": 9.0, "x": 9.0, "n_spo": n} for n in range(3, 8)]

@@ -61,9 +61,11 @@ def ratio_columns(counted: Sequence[Counted]) -> pd.DataFrame:
         In their order: ``extrema_ratio, common_ratio, unique_ratio`` with ``low_extrema,
         high_extrema`` and so on; ``ratio_drop``, by how much the ratio of unique ones is lower than
         that of all comparable ones, with ``low_drop, high_drop``; ``share_duplicates`` of the
-        comparable ones with its Wilson interval ``low_duplicates, high_duplicates``; and
+        comparable ones with its Wilson interval ``low_duplicates, high_duplicates``;
         ``low_condition, high_condition``, the interval of the median condition number from order
-        statistics. All 95 %; ratios are NaN without SIFT's sampling.
+        statistics; and ``range_drop``, by how much the ratio of the comparable ones is lower than
+        that of all, with ``low_range, high_range``. All 95 %; ratios are NaN without SIFT's
+        sampling.
     """
     named = [
         (one.numbers["n_spo"], one.numbers["delta_min"], one.numbers["balanced"]) for one in counted
@@ -89,7 +91,22 @@ def ratio_columns(counted: Sequence[Counted]) -> pd.DataFrame:
     parts |= {
         f"{end}_condition": [getattr(each, end) for each in medians] for end in ("low", "high")
     }
-    return pd.DataFrame(parts)
+    return pd.DataFrame(parts | _range_drop(counted, default))
+
+
+def _range_drop(counted: Sequence[Counted], default: int | None) -> dict[str, Any]:
+    """Ratios of all extrema less those of the comparable ones, of the same pieces of the scene."""
+    n = len(counted)
+    # Pieces at the border hold no comparable ones: both kinds are cut into pieces together.
+    tables = [one.extrema[["y", "x"]] for one in counted]
+    tables += [one.common[["y", "x"]] for one in counted]
+    if default is None:
+        return dict.fromkeys(("range_drop", "low_range", "high_range"), np.full(n, np.nan))
+    numbers = np.vstack(count_ratios(tables, default, purpose=("samplings",)))
+    of_sift = np.where(numbers[:, [n + default]] > 0, numbers[:, [n + default]], np.nan)
+    drops = numbers[:, :n] - numbers[:, n:] / of_sift
+    low, high = percentile_interval(drops[1:])
+    return {"range_drop": drops[0], "low_range": low, "high_range": high}
 
 
 def sampling_counts(extrema: pd.DataFrame, common: pd.DataFrame, same: Same) -> dict[str, Any]:

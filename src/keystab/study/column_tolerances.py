@@ -69,7 +69,7 @@ _SHARES = (
     "percentage_of_images percentage_of_unique percentage_seen mean_detections mean_above "
     "mean_common auc best_auc gain n_new n_lost n_true n_found n_detections n_right n_twin "
     "extrema_ratio common_ratio unique_ratio octave_ratio ratio_drop share_duplicates above_dog "
-    "share_chance kept_always kept_others step"
+    "range_drop share_chance kept_always kept_others step"
 )
 _ENDS = (
     "low high low_detections high_detections low_above high_above low_always high_always "
@@ -77,7 +77,8 @@ _ENDS = (
     "recall_high precision_low precision_high auc_low auc_high rejected_low rejected_high "
     "gain_low gain_high low_extrema high_extrema low_common high_common low_unique high_unique "
     "low_octave high_octave low_drop high_drop low_duplicates high_duplicates low_chance "
-    "high_chance low_step high_step low_kept high_kept low_others high_others"
+    "high_chance low_step high_step low_kept high_kept low_others high_others low_range "
+    "high_range"
 )
 
 COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
