@@ -36,3 +36,5 @@ rule all:
         plan.final_files("", RESULTS, config["figures"], CLAIMED),
         f"{RESULTS}/final.sha256",
         expand(f"{RESULTS}/scale_space/n{{n_spo}}.sha256", n_spo=plan.kept_n_spo(STUDY)),
+    message:
+        "All figures, tables and verdicts"

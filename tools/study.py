@@ -19,11 +19,13 @@ import sys
 import time
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 DURATIONS = Path(__file__).with_name("durations.csv")
 
 JOB = re.compile(r"^Job (\d+): (.+)$")
 FINISHED = re.compile(r"^Finished jobid: (\d+) ")
+WHOLE = "Finished jobid: 0 (Rule: all)"
 # What stages say about their input, disk or memory, and Snakemake about folders.
 REASONS = ("error: ", "OSError: ", "PermissionError: ")
 AGAIN = "mend that and type the same command again."
@@ -112,12 +114,18 @@ def config_files(arguments: list[str]) -> list[str]:
     return list(itertools.takewhile(lambda argument: not argument.startswith("-"), after))
 
 
+def settings_of(arguments: list[str]) -> dict[str, Any]:
+    """Settings of a run."""
+    from keystab.study.settings import read_yaml
+
+    return read_yaml("config/config.yaml", *config_files(arguments))
+
+
 def not_writable(arguments: list[str]) -> list[str]:
     """Folders of the settings in which nothing can be written."""
     from keystab.study.result_folders import FOLDERS, normal_folder
-    from keystab.study.settings import read_yaml
 
-    settings = read_yaml("config/config.yaml", *config_files(arguments))
+    settings = settings_of(arguments)
     folders = [".snakemake", *(normal_folder(str(settings[key])) for key in FOLDERS)]
     return [folder for folder in folders if not os.access(existing(Path(folder)), os.W_OK)]
 
@@ -174,6 +182,7 @@ def main(arguments: list[str]) -> int:
         print(f"error: {wrong}", file=sys.stderr)
         return 2
     from interrupted import take_up, why_locked  # beside this file
+    from study_end import ending, short
 
     take_up(Path.cwd(), functools.partial(print, flush=True))
     from keystab.provenance.shielded_environment import shielded
@@ -204,7 +213,7 @@ def main(arguments: list[str]) -> int:
     began: dict[str, tuple[str, float]] = {}
     taken: dict[str, float] = {}
     reasons: list[str] = []
-    locked = False
+    locked = whole = False
     start = time.monotonic()
     with subprocess.Popen(
         [*snakemake, *arguments],
@@ -217,8 +226,9 @@ def main(arguments: list[str]) -> int:
         assert run.stdout is not None
         try:
             for line in run.stdout:
-                print(line, end="", flush=True)
+                print(short(line), end="", flush=True)
                 now = time.monotonic()
+                whole = whole or line.startswith(WHOLE)
                 locked = locked or "Directory cannot be locked" in line
                 if line.startswith(REASONS) and line not in reasons:
                     reasons.append(line)
@@ -231,6 +241,8 @@ def main(arguments: list[str]) -> int:
                     print(clock.line(now - start), flush=True)
         except KeyboardInterrupt:  # Snakemake got it as well, and puts its jobs away
             print(run.stdout.read(), end="", flush=True)
+    if run.returncode == 0 and whole:
+        print(ending(settings_of(arguments)), end="", flush=True)
     if record is not None and run.returncode == 0:
         write_durations(taken, record)
     if locked:

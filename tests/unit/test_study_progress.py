@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import json
 import runpy
 from pathlib import Path
 
@@ -85,3 +87,27 @@ def test_files_that_are_no_settings_get_one_line(capsys, tmp_path, tool, text, l
     assert main(["--cores", "1", "--configfile", str(path)]) == 2
     said = capsys.readouterr().err
     assert said.startswith(f"error: {path}: {line}") and said.count("\n") == 1
+
+
+def test_the_end_of_a_study_says_what_was_found_and_where_it_lies(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(TOOLS)
+    ending = importlib.import_module("study_end").ending
+    settings = {"results": "r", "figures": "f", "reference": "roof.png", "draft": False}
+    assert ending(settings, tmp_path) == ""
+    claims = [
+        {"id": name, "statement": f"{name} holds.", "verdict": verdict, "p": p}
+        for name, verdict, p in [
+            ("a", "reproduced", 0.0),
+            ("b", "not reproduced", None),
+            ("c", "not reproduced", 0.02),
+            ("d", "not reproduced", 0.01),
+            ("e", "not reproduced", 0.03),
+        ]
+    ]
+    (tmp_path / "r").mkdir()
+    (tmp_path / "r/claims.json").write_text(json.dumps(claims))
+    lines = ending(settings, tmp_path).splitlines()
+    assert lines[1] == "Verdicts on roof.png: 1 reproduced, 4 not reproduced."
+    assert [line.split(":")[0].strip() for line in lines[2:5]] == ["d", "c", "e"]
+    assert "r/claims.md" in lines[5] and "f/*.pdf" in lines[5]
+    assert ending(settings | {"draft": True}, tmp_path).startswith("\nVerdicts of a draft")
