@@ -379,20 +379,35 @@ def test_the_reference_holds_what_is_small_and_is_compared_with(here, monkeypatc
     )
 
 
-def test_an_audit_beside_a_study_is_neither_missed_nor_in_its_way(here, monkeypatch, capsys):
+def test_an_audit_and_scenes_beside_a_study_are_neither_missed_nor_in_its_way(
+    here, monkeypatch, capsys
+):
     monkeypatch.chdir(here.project)
     assert cli.main(["verify"]) == 0  # nobody asked for one
     (here.project / "results/tables/audit.csv").write_text("detector,bias_y\nopencv,0.25\n")
     (here.project / "figures/audit.png").write_bytes(b"a figure")
+    (here.project / "results/scenes/lake/tables").mkdir(parents=True)
+    for name in (
+        "results/scenes/claims.csv",
+        "results/scenes/lake/claims.csv",
+        "figures/scenes.png",
+    ):
+        (here.project / name).write_text("claim,scene\n")
     assert cli.main(["verify"]) == 0, capsys.readouterr().out
     assert cli.main(["reference"]) == 0
     folder = here.project / "results/reference/audit"
     assert {path.name for path in folder.iterdir()} == {"audit.csv", "audit.png"}
+    assert {path.name for path in (folder.parent / "scenes").iterdir()} == {
+        "claims.csv",
+        "scenes.png",
+    }
     assert cli.main(["verify"]) == 0
     assert cli.main(["archive"]) == 0
     (packed,) = (here.project / "results/archive").iterdir()
     names = zipfile.ZipFile(packed).namelist()
-    assert not any(name.startswith(("results/tables/audit", "figures/audit")) for name in names)
+    assert not [
+        name for name in names if re.match("results/(tables/audit|scenes/)|figures/(a|s)", name)
+    ]
     (folder / "audit.csv").write_text("detector,bias_y\nopencv,0.00\n")
     assert cli.main(["verify"]) == 1  # a reference that was changed
 

@@ -26,8 +26,8 @@ from keystab.provenance.lineage import file_digest
 from keystab.provenance.ro_crate import Item, crate_text
 from keystab.provenance.run_description import (
     ABOUT,
-    AUDIT_FIGURES,
     AUDIT_TABLES,
+    FIGURES_BESIDE,
     LEFT_OUT,
     LEFT_OUT_COLUMNS,
     SUMS,
@@ -194,8 +194,8 @@ def publish(study: Study, folder: Path | None = None) -> Path:
     }
     for number, overlay in enumerate(study.overlays, 1):
         files[_overlay(number, overlay)] = (project / overlay).read_bytes()
-    for path in _audit(study):
-        files[f"audit/{path.name}"] = path.read_bytes()
+    for name, path in _beside(study):
+        files[name] = path.read_bytes()
     files[ABOUT] = _about(contents)
     files[LEFT_OUT] = _listed(big, contents).encode()
     files[SUMS] = _sums(files)
@@ -206,11 +206,17 @@ def publish(study: Study, folder: Path | None = None) -> Path:
     return folder
 
 
-def _audit(study: Study) -> list[Path]:
-    """Tables and PNG figure of an audit, where one was asked for."""
-    tables = [study.project / study.results / "tables" / name for name in AUDIT_TABLES]
-    figures = [study.project / study.figures / name for name in AUDIT_FIGURES if "png" in name]
-    return [path for path in (*tables, *figures) if path.is_file()]
+def _beside(study: Study) -> Iterator[tuple[str, Path]]:
+    """What an audit and the corpus of scenes found, where they were asked for, and its names."""
+    results, figures = study.project / study.results, study.project / study.figures
+    paths = [results / "tables" / name for name in AUDIT_TABLES]
+    paths += [figures / name for name in FIGURES_BESIDE if name.endswith(".png")]
+    for path in paths:
+        if path.is_file():
+            yield f"{path.stem.partition('_')[0]}/{path.name}", path
+    for path in sorted((results / "scenes").glob("*.*")):
+        if path.is_file():
+            yield f"scenes/{path.name}", path
 
 
 def _about(contents: Contents) -> bytes:

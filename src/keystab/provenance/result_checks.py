@@ -20,8 +20,8 @@ from keystab.errors import InputError
 from keystab.provenance.foreign_tables import read_foreign_table
 from keystab.provenance.lineage import code_of_figure, file_digest, read_figure_metadata
 from keystab.provenance.run_description import (
-    AUDIT_FIGURES,
     AUDIT_TABLES,
+    FIGURES_BESIDE,
     LEFT_OUT,
     LEFT_OUT_COLUMNS,
     About,
@@ -124,9 +124,9 @@ class Run(NamedTuple):
 
     @property
     def figures(self) -> list[Path]:
-        """All its figures; not that of an audit."""
+        """All its figures; not those of an audit and of several scenes."""
         paths = self.files(self.about.figures, ".pdf", ".png")
-        return [path for path in paths if path.name not in AUDIT_FIGURES]
+        return [path for path in paths if path.name not in FIGURES_BESIDE]
 
     @property
     def verdicts(self) -> list[Path]:

@@ -15,8 +15,8 @@ from keystab.study.result_folders import folder_problem
 
 __all__ = [
     "ABOUT",
-    "AUDIT_FIGURES",
     "AUDIT_TABLES",
+    "FIGURES_BESIDE",
     "LEFT_OUT",
     "LEFT_OUT_COLUMNS",
     "SUMS",
@@ -32,8 +32,9 @@ SUMS = "SHA256SUMS"
 LEFT_OUT = "left-out.csv"
 LEFT_OUT_COLUMNS = ["path", "bytes", "sha256", "rule"]
 AUDIT_TABLES = ("audit.csv", "audit_octaves.csv", "audit_phases.csv")
-AUDIT_FIGURES = ("audit.pdf", "audit.png")
-"""What an audit leaves beside the tables and figures of a study, of which it is no part."""
+FIGURES_BESIDE = ("audit.pdf", "audit.png", "scenes.pdf", "scenes.png")
+"""What an audit and the corpus of scenes leave beside the tables and figures of a study, of which
+they are no part."""
 MOST_BYTES_OF_ABOUT = 1_000_000
 
 _DIGEST = re.compile("[0-9a-f]{64}")
