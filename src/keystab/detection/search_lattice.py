@@ -31,13 +31,13 @@ from keystab.detection.search_bounds import SplineBounds, off_at_nodes
 from keystab.detection.search_cells import search_cells
 from keystab.detection.search_functionals import expansion
 from keystab.detection.search_hulls import CELLS, MARGIN, NODES
+from keystab.detection.search_kept import Kept
 from keystab.detection.search_nodes import LocalAxis, kinked_rows, local_axis, spline_nodes
 from keystab.detection.search_records import BLOCK, GROUP, TILE, Band, Kinked
 from keystab.detection.search_samples import search_samples
 from keystab.detection.search_sums import rows_of_nodes
 from keystab.scalespace.dog import ScaleSpace
 from keystab.scalespace.spline_axis import SplineAxis
-from keystab.utils.kept import Kept
 
 # Samples from one node to the next, where they lie one standard deviation of the finest slice
 # apart, and the power with which they become fewer: measured. Extrema among coarser samples differ

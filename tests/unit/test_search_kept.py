@@ -9,7 +9,7 @@ import pytest
 
 from keystab.detection import search_lattice
 from keystab.detection.detector import detect_keypoints
-from keystab.utils.kept import Kept
+from keystab.detection.search_kept import Kept
 
 
 def counted(most: int) -> tuple[Kept[str], list[int]]:
