@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from keystab import __version__, scale_space
+from keystab import __version__, detect_keypoints, keypoint_uncertainty, scale_space
 from keystab.camera.views import ViewSpec
 from keystab.cli.parser import build_parser
 from keystab.io.scale_space_store import write_scale_space
@@ -145,6 +145,24 @@ def test_commands_of_the_readme_are_understood():
     }
     for command in commands:
         build_parser().parse_args(command[1:])  # exits where it does not understand
+
+
+def test_commands_of_the_page_on_error_bars_are_understood():
+    lines = "\n".join(blocks("docs/uncertainty.md", "sh")).splitlines()
+    commands = [shlex.split(line, comments=True) for line in lines if line]
+    assert len(commands) > 3
+    for command in commands:
+        assert command[:2] == ["keystab", "uncertainty"]
+        build_parser().parse_args(command[1:])  # exits where it does not understand
+
+
+def test_the_page_on_error_bars_has_every_column():
+    rows = re.findall(r"^\| (`.*?) \|", text_of("docs/uncertainty.md"), re.MULTILINE)
+    named = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    y, x = np.mgrid[:24, :24] - 12.0
+    found = keypoint_uncertainty(np.exp(-(y**2 + x**2) / 8), 0.8, 0.01, n_spo=3)
+    detected = set(detect_keypoints(np.eye(12), 0.8).columns)
+    assert set(found.columns) - detected == named - detected
 
 
 def test_examples_of_the_readme_run(monkeypatch):

@@ -56,7 +56,12 @@ def test_the_figure_shows_its_tables(tables):
     assert set(panels) == set("abcdefghi")
     lines = {name: {line.get_label(): line for line in ax.lines} for name, ax in panels.items()}
     assert lines["a"]["bars"].get_ydata() == pytest.approx([-2.0] * 4)
-    assert lines["b"]["estimated shot"].get_xdata() == pytest.approx([0.003, 0.03])
+    # Lines of a panel stand side by side, about the noise that its axis names.
+    cases = [lines["b"][" ".join(case)].get_xdata() for case in uncertainty.CASES]
+    assert np.all(np.diff(np.array(cases), axis=0) > 0)
+    assert np.prod(cases, axis=0) ** (1 / len(cases)) == pytest.approx([0.003, 0.03])
+    for name in "bcdehi":
+        assert [text.get_text() for text in panels[name].get_xticklabels()] == ["0.003", "0.03"]
     assert lines["b"]["estimated shot"].get_ydata() == pytest.approx([88.0, 88.0])
     assert lines["c"]["shot view"].get_ydata() == pytest.approx([88.0, 88.0])
     assert lines["d"]["jpeg alone"].get_ydata() == pytest.approx([88.0, 88.0])

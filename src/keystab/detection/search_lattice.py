@@ -31,8 +31,9 @@ from keystab.detection.search_bounds import SplineBounds, off_at_nodes
 from keystab.detection.search_cells import search_cells
 from keystab.detection.search_functionals import expansion
 from keystab.detection.search_hulls import CELLS, MARGIN, NODES
+from keystab.detection.search_kept import Kept
 from keystab.detection.search_nodes import LocalAxis, kinked_rows, local_axis, spline_nodes
-from keystab.detection.search_records import BLOCK, GROUP, TILE, Band, Kinked, NodeRows
+from keystab.detection.search_records import BLOCK, GROUP, TILE, Band, Kinked
 from keystab.detection.search_samples import search_samples
 from keystab.detection.search_sums import rows_of_nodes
 from keystab.scalespace.dog import ScaleSpace
@@ -59,6 +60,10 @@ _KINKED = 1.4
 
 # Cells along x that are searched at once: bounds the memory on wide images.
 _COLUMNS = 1536
+
+# Bytes of rows at nodes that are kept for further images of one size. Those of a small view are a
+# few megabytes; in the coarse octaves of a photograph each part has a hundred megabytes of its own.
+_KEPT = 2**26
 
 # Images with larger values are left to a dense evaluation, which does not use single precision.
 LARGEST = 1e30
@@ -271,10 +276,8 @@ def _runs(dense: NDArray[np.bool_], between: int) -> list[tuple[int, int]]:
     return [(TILE * int(part[0]), TILE * (int(part[-1]) + 1)) for part in parts]
 
 
-@lru_cache(maxsize=64)
-def _nodes(axis: LocalAxis, p: int, begin: int, n_groups: int, dtype: type) -> NodeRows:
-    """Rows at nodes, kept for further images of this size."""
-    return spline_nodes(axis, p, begin, n_groups, dtype)
+#: Rows at nodes, kept for further images of this size.
+_nodes = Kept(spline_nodes, lambda rows: sum(part.nbytes for part in rows), _KEPT)
 
 
 @lru_cache(maxsize=4)

@@ -44,7 +44,7 @@ METHODS = {
 
 CASES = {
     ("shot", "shot"): ("one shot, noise given", BLUE),
-    ("estimated", "shot"): ("one shot alone", VIOLET),
+    ("estimated", "shot"): ("one shot, noise estimated", VIOLET),
     ("view", "shot"): ("noiseless view", GREEN),
     ("shot", "view"): ("against noiseless view", ORANGE),
 }
@@ -55,6 +55,9 @@ KINDS = {
     "signal": ("signal-dependent", GREEN),
     "jpeg": ("JPEG", ORANGE),
 }
+
+REGIONS = {"position": "ellipses", "scale": "intervals"}
+"""What error bars are of a place, and of a number."""
 
 STRATA = {"sigma": "scale", "conditioning": "conditioning", "contrast": "contrast"}
 
@@ -72,6 +75,12 @@ TASKS = {
 """What keypoints are asked for, and colours."""
 
 KNOWN, ALONE = ("shot", "shot"), ("estimated", "shot")
+
+DASHES = (0, (2.5, 1.2))
+"""Lines of what has its noise estimated, and of low survival left out."""
+
+_ASIDE = 1.045
+"""Lines that hold as much stand beside each other by this factor of the noise."""
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
@@ -108,15 +117,15 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         grid = figure.add_gridspec(1, 1)[0]
         axes = style.panels(grid, 3, 3, hspace=0.05, wspace=0.05).ravel()
         titles = (
-            "what ellipses hold", "position: predicted from", "scale: predicted from",
-            "kinds of noise", "blur of the camera", "quarters of the keypoints",
+            "what ellipses hold", "position, predicted from", "scale, predicted from",
+            "position, by kind of noise", "position, by camera blur", "position, in quarters",
             "survival", "what tells who returns", "errors with weights",
         )  # fmt: skip
         for ax, name, title in zip(axes, "abcdefghi", titles, strict=True):
             style.letter(ax, name, title)
         _draw_levels(axes[0], _usual(coverage, blur))
         for ax, quantity in zip(axes[1:3], ("position", "scale"), strict=True):
-            _draw_cases(ax, additive[additive["quantity"] == quantity])
+            _draw_cases(ax, additive[additive["quantity"] == quantity], REGIONS[quantity])
         _draw_kinds(axes[3], position[position["blur"] == blur])
         _draw_blurs(axes[4], position[position["kind"] == "additive"])
         _draw_strata(axes[5], tables["uncertainty_strata"])
@@ -162,24 +171,24 @@ def _draw_levels(ax: Axes, rows: DataFrame) -> None:
     low, high = ax.get_ylim()
     ax.set_ylim(low - 0.45 * (high - low), high)
     ax.set_xlabel("ellipses that should hold (%)")
-    ax.set_ylabel("hold beyond that (points)")
+    ax.set_ylabel("excess held (points)")
     _name(ax, list(METHODS.values()))
 
 
-def _draw_cases(ax: Axes, rows: DataFrame) -> None:
-    """Draw what is held against noise, by what it is predicted from."""
-    for case, (_, colour) in CASES.items():
-        _draw_line(ax, _case(rows, case), colour, f"{case[0]} {case[1]}")
-    _coverage_axis(ax, rows)
+def _draw_cases(ax: Axes, rows: DataFrame, regions: str) -> None:
+    """Draw what is held against noise, by what it is predicted from, side by side."""
+    for place, (case, (_, colour)) in enumerate(CASES.items()):
+        _draw_line(ax, _case(rows, case), colour, f"{case[0]} {case[1]}", shift=place - 1.5)
+    _coverage_axis(ax, rows, regions)
     _name(ax, list(CASES.values()))
 
 
 def _draw_kinds(ax: Axes, rows: DataFrame) -> None:
     """Draw what is held against noise by its kind; dashed where it is estimated."""
-    for kind, (_, colour) in KINDS.items():
-        own = rows[rows["kind"] == kind]
-        _draw_line(ax, _case(own, KNOWN), colour, f"{kind} known")
-        _draw_line(ax, _case(own, ALONE), colour, f"{kind} alone", (0, (2.5, 1.2)))
+    for place, (kind, (_, colour)) in enumerate(KINDS.items()):
+        own, shift = rows[rows["kind"] == kind], place - 1.0
+        _draw_line(ax, _case(own, KNOWN), colour, f"{kind} known", shift=shift)
+        _draw_line(ax, _case(own, ALONE), colour, f"{kind} alone", DASHES, shift)
     _coverage_axis(ax, rows)
     _name(ax, [*KINDS.values(), ("dashed: estimated", palette.GREY)])
 
@@ -187,25 +196,27 @@ def _draw_kinds(ax: Axes, rows: DataFrame) -> None:
 def _draw_blurs(ax: Axes, rows: DataFrame) -> None:
     """Draw what is held against noise by the camera's blur; dashed where noise is estimated."""
     colours = palette.sweep_colours(rows["blur"].unique())
-    for blur, colour in colours.items():
-        own = rows[rows["blur"] == blur]
-        _draw_line(ax, _case(own, KNOWN), colour, f"{blur:g} known")
-        _draw_line(ax, _case(own, ALONE), colour, f"{blur:g} alone", (0, (2.5, 1.2)))
+    for place, (blur, colour) in enumerate(colours.items()):
+        own, shift = rows[rows["blur"] == blur], place - (len(colours) - 1) / 2
+        _draw_line(ax, _case(own, KNOWN), colour, f"{blur:g} known", shift=shift)
+        _draw_line(ax, _case(own, ALONE), colour, f"{blur:g} alone", DASHES, shift)
     _coverage_axis(ax, rows)
     names = [(f"{blur:g} px", colour) for blur, colour in colours.items()]
     _name(ax, [*names, ("dashed: estimated", palette.GREY)])
 
 
-def _draw_line(ax: Axes, rows: DataFrame, colour: Any, label: str, line: Any = "-") -> None:
-    """Draw a coverage with its interval against noise."""
+def _draw_line(
+    ax: Axes, rows: DataFrame, colour: Any, label: str, line: Any = "-", shift: float = 0.0
+) -> None:
+    """Draw a coverage with its interval against noise, some steps aside of those beside it."""
     rows = rows.sort_values("noise")
-    ends = (100 * rows["low"], 100 * rows["high"])
-    ax.fill_between(rows["noise"], *ends, color=colour, alpha=0.12, linewidth=0)
-    ax.plot(rows["noise"], 100 * rows["held"], color=colour, linestyle=line, linewidth=1.2,
+    at = rows["noise"] * _ASIDE**shift
+    ax.vlines(at, 100 * rows["low"], 100 * rows["high"], color=colour, linewidth=0.8)
+    ax.plot(at, 100 * rows["held"], color=colour, linestyle=line, linewidth=1.0,
             marker="o", markersize=2.4, label=label)  # fmt: skip
 
 
-def _coverage_axis(ax: Axes, rows: DataFrame) -> None:
+def _coverage_axis(ax: Axes, rows: DataFrame, regions: str = REGIONS["position"]) -> None:
     """Mark what should be held, and leave room for names below what is."""
     ax.axhline(100 * LEVEL, color=palette.GREY, linewidth=0.7, linestyle=":")
     noise = np.sort(rows["noise"].unique())
@@ -214,12 +225,16 @@ def _coverage_axis(ax: Axes, rows: DataFrame) -> None:
     # Names stand on the right, where noise is large: what dips on the left needs no room below.
     least = min(82.0, 100 * float(rows.loc[rows["noise"] == noise[-1], "low"].min()) - 1)
     ax.set_ylim(min(low, least - 0.6 * (100 - least)), 100.0)
-    ax.set_ylabel(f"held by {100 * LEVEL:.0f} % ellipses (%)")
+    ax.set_ylabel(f"held by {100 * LEVEL:.0f} % {regions} (%)")
 
 
 def _noise_axis(ax: Axes, noise: Any) -> None:
+    """Mark the noises that were measured, or round ones where these are many or close."""
     noise = np.sort(noise)
     style.log_x_axis(ax, noise[0] / 1.15, noise[-1] * 1.15)
+    if len(noise) < 6 and (np.diff(np.log(noise)) > 0.15 * np.log(noise[-1] / noise[0])).all():
+        ax.set_xticks(noise, [f"{level:g}" for level in noise])
+        ax.set_xticks([], minor=True)
     ax.set_xlim(noise[0] / 1.25, noise[-1] * 1.25)
     ax.set_xlabel("noise (grey range 1)")
 
@@ -238,8 +253,9 @@ def _draw_strata(ax: Axes, table: DataFrame) -> None:
         ticks.append(float(at.mean()))
     low, high = ax.get_ylim()
     ax.set_ylim(low - 0.35 * (high - low), high)
-    ax.set_xticks(ticks, [f"{name}\nlow to high" for name in STRATA.values()])
+    ax.set_xticks(ticks, list(STRATA.values()))
     ax.tick_params(axis="x", length=0)
+    ax.set_xlabel("each from low to high")
     ax.set_ylabel(f"held by {100 * LEVEL:.0f} % ellipses (%)")
     _name(ax, list(METHODS.values()))
 
@@ -251,13 +267,15 @@ def _draw_reliability(ax: Axes, rows: DataFrame) -> None:
     for noise, colour in colours.items():
         part = rows[rows["noise"] == noise]
         x = 100 * part["predicted_survival"]
-        ax.vlines(x, 100 * part["low"], 100 * part["high"], color=colour, linewidth=0.8)
-        # Of bins that hold a handful, the interval says all.
+        # Of bins that hold a handful, the interval says all, and is not what the eye should meet.
         sure = part["high"] - part["low"] < 0.3
+        for rows_of, width in ((sure, 0.8), (~sure, 0.4)):
+            ends = 100 * part.loc[rows_of, "low"], 100 * part.loc[rows_of, "high"]
+            ax.vlines(x[rows_of], *ends, color=colour, linewidth=width)
         ax.plot(x, (100 * part["found"]).where(sure), "o-", color=colour, linewidth=1.0,
                 label=f"{noise:g}")  # fmt: skip
     ax.set(xlim=(0, 100), ylim=(0, 101))
-    ax.set_xlabel("survival (%)")
+    ax.set_xlabel("survival that is predicted (%)")
     ax.set_ylabel("found again (%)")
     _name(ax, [(f"noise {noise:g}", colour) for noise, colour in colours.items()])
 
@@ -268,7 +286,9 @@ def _draw_areas(ax: Axes, rows: DataFrame) -> None:
         part = rows[rows["guess"] == guess].sort_values("noise")
         ax.plot(part["noise"], part["auc"], "o-", color=colour, linewidth=1.2, label=guess)
     _noise_axis(ax, rows["noise"].unique())
-    ax.set_ylim(min(0.4, float(rows["auc"].min()) - 0.02), 1.0)
+    ax.axhline(0.5, color=palette.GREY, linewidth=0.7, linestyle=":", label="chance")
+    style.direct_label(ax, ax.get_xlim()[0], 0.5, "chance", palette.GREY, 2, 5, ha="left")
+    ax.set_ylim(min(0.28, float(rows["auc"].min()) - 0.02), 1.0)  # names stand below chance
     ax.set_ylabel("area under the ROC curve")
     _name(ax, list(GUESSES.values()))
 
@@ -278,7 +298,7 @@ def _draw_weights(ax: Axes, table: DataFrame) -> None:
     shown = table[table["weights"] == "bars"]
     ax.axhline(1.0, color=palette.GREY, linewidth=0.7, linestyle=":")
     for place, (task, (_, colour)) in enumerate(TASKS.items()):
-        for kept, line, face in (("all", "-", colour), ("surviving", (0, (2.5, 1.2)), "white")):
+        for kept, line, face in (("all", "-", colour), ("surviving", DASHES, "white")):
             own = shown[(shown["task"] == task) & (shown["kept"] == kept)].sort_values("noise")
             at = own["noise"] * 1.05 ** (place - 1)
             ax.vlines(at, own["ratio_low"], own["ratio_high"], color=colour, linewidth=0.8)

@@ -23,6 +23,16 @@ A detector looks at the 26 neighbours of a sample, so that it takes a saddle for
 all of these lie on its steep sides: along a ridge askew to the grid. Therefore a stationary point
 counts as an extremum where the curvature has the sign along the 13 directions of the grid, and not
 along all.
+
+Two things are left out, and seen. *Terms of the fourth order*: of views without noise whose
+keypoints have a survival of 0.3 to 0.9 (``street``, ``otter``, ``lanterns`` at noise of 0.03),
+climbing on w itself, given the noise, agrees with the detector in 98 % of the cases, and on the
+cubic in 90 %, which misses somewhat more extrema than it invents. *What kind of scene it is*: the
+spectrum's exponent of 2 and its being the same in all directions. Seen through noise, Gaussian
+fields of exponent 3 return more than is said (0.77 for 0.74, noise an eighth of their amplitude),
+and made strokes less (0.54 for 0.58 at noise of 0.03). With the right exponent half of the former
+error is gone; the exponent under which the jets of ``street`` are likeliest, some 3, makes its
+error larger (0.077 for 0.068), because its edges have one direction: so none is inferred.
 """
 
 from __future__ import annotations
