@@ -18,7 +18,7 @@ _MOST_CANDIDATES = 1024
 def search_samples(rows, blurred, lower, upper, band, off, tolerance, found, dense):  # noqa: PLR0913
     """As `search_cells` where every sample is a node, and samples are compared as they are.
 
-    `off` is how far a difference of two samples may be off, but for single precision.
+    `off` is how far samples of each slice may be off, but for single precision.
     """
     n_slices, n_cells = lower.size, band.n_cells
     gaussians = np.empty((blurred.shape[0], GROUP, NODES), dtype=np.float32)
@@ -59,7 +59,7 @@ def search_samples(rows, blurred, lower, upper, band, off, tolerance, found, den
                 own = 2 * SINGLE_ROUNDING * sizes[s].max()
                 for k in range(3):
                     other = 2 * SINGLE_ROUNDING * sizes[s - 1 + k].max()
-                    least[k] = slack_of(tolerance, off + own + other)
+                    least[k] = slack_of(tolerance, off[s] + off[s - 1 + k] + own + other)
                 finer, here, coarser = nodes[s - 1], nodes[s], nodes[s + 1]
                 _stand_out(
                     finer[at:],

@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-import threadpoolctl
 from numba import njit
 
 from keystab.errors import InputError
@@ -24,6 +23,7 @@ from keystab.scalespace.rounding import Rounding
 from keystab.scalespace.sampling import Sampling, balanced_delta
 from keystab.utils import memory
 from keystab.utils.masks import unmasked
+from keystab.utils.one_thread import one_thread
 
 # A tile of the store; searching for extrema uses flatter blocks (see `keystab.detection.extrema`).
 TILE = 128
@@ -136,7 +136,7 @@ class ScaleSpace:
         )
         box = np.empty((s1 - s0, y1 - y0, x1 - x0))
         tile_rows = list(ranges(y0, y1, TILE))
-        with threadpoolctl.threadpool_limits(1):
+        with one_thread():
             along = [self.axes[0].block(*part) for part in tile_rows]
             for left, right in ranges(x0, x1, TILE):
                 blocks = self.blocks(along, (left, right), (s0, s1))

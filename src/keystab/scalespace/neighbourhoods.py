@@ -8,12 +8,12 @@ scale-space was cut up.
 from __future__ import annotations
 
 import numpy as np
-import threadpoolctl
 from numba import njit
 
 from keystab.scalespace.axis import AxisOperator
 from keystab.scalespace.cosine_axis import CosineAxis
 from keystab.scalespace.spline_axis import SplineAxis, fill_rows
+from keystab.utils.one_thread import one_thread
 
 # Candidates handled at once in cosine mode: bounds the memory of their cosines.
 _BATCH = 256
@@ -62,7 +62,7 @@ def cosine_neighbourhoods(
     cubes = np.zeros((s.size, 3, 3, 3))
     around = np.arange(-1, 2)
     # One thread: digits must not depend on the cores, and the products are too small to share.
-    with threadpoolctl.threadpool_limits(1):
+    with one_thread():
         for start in range(0, s.size, _BATCH):
             part = slice(start, start + _BATCH)
             _cosine_cubes(

@@ -70,7 +70,7 @@ class SplineAxis:
         splines = mirrored_splines(*spline_rows(n_samples, n_pixels, delta_min), taps.shape[1] // 2)
         reach = np.array([kernel.size - 1 for kernel in kernels])
         rings = reach > _LOCAL_REACH * blurs / delta_min + 1
-        dense = SplineRows(n_samples, taps, reach, splines, *_no_tables(blurs.size))
+        dense = SplineRows(n_samples, taps, reach, splines, *no_tables(blurs.size))
         self.rows, lacking = with_tables(dense, np.flatnonzero(rings), self.n_columns)
         self.rounding = rounding_of_rows(self.rows, lacking, delta_min, blurs, self.n_columns)
 
@@ -127,8 +127,13 @@ def spline_rows(n_samples: int, n_pixels: int, delta_min: float) -> tuple[np.nda
     position = np.arange(n_samples) * delta_min
     # delta_min may round position to just beyond the last pixel's cell.
     knot = np.minimum(np.floor(position), n_pixels - 1).astype(np.int64)
-    t = position - knot
-    weight = np.stack(
+    weight = cubic_weights(position - knot)
+    return knot - 1 + _PADDING, weight
+
+
+def cubic_weights(t: np.ndarray) -> np.ndarray:
+    """Weights of the four B-splines around positions t in [0, 1] after a knot, shape (n, 4)."""
+    return np.stack(
         [
             (1 - t) ** 3 / 6,
             (4 - 6 * t**2 + 3 * t**3) / 6,
@@ -137,7 +142,6 @@ def spline_rows(n_samples: int, n_pixels: int, delta_min: float) -> tuple[np.nda
         ],
         axis=1,
     )
-    return knot - 1 + _PADDING, weight
 
 
 class MirroredSplines(NamedTuple):
@@ -209,7 +213,8 @@ class SplineRows(NamedTuple):
     value: np.ndarray
 
 
-def _no_tables(n_blurs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def no_tables(n_blurs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`SplineRows.table`, `first` and `value` where all rows are made when needed."""
     empty = np.empty((0, 0), dtype=np.int64), np.empty((0, 0, 0))
     return (np.full(n_blurs, -1), *empty)
 
