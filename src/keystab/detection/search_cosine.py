@@ -121,7 +121,7 @@ def knots_of(coefficients: Array, axes: tuple[LocalAxis, LocalAxis]) -> Array:
     """
     from scipy import fft
 
-    values: Array = coefficients
+    values = coefficients
     for axis in axes:
         # Knots at both mirrors, half a pixel beyond the last ones.
         n = values.shape[0]
@@ -135,8 +135,7 @@ def knots_of(coefficients: Array, axes: tuple[LocalAxis, LocalAxis]) -> Array:
 
 def _frequencies(n: int) -> Array:
     """Frequencies of an axis of n pixels, per pixel."""
-    frequency: Array = np.pi / n * np.arange(n)
-    return frequency
+    return np.pi / n * np.arange(n, dtype=np.float64)
 
 
 def _left_by_splines(frequency: Array) -> Array:

@@ -31,7 +31,7 @@ def spline_neighbourhoods(
     """Cubes around samples of a spline scale-space, shape (n, 3, 3, 3)."""
     y_axis, x_axis = axes
     assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
-    cubes = np.zeros((s.size, 3, 3, 3))
+    cubes = np.empty((s.size, 3, 3, 3))
     _spline_cubes(
         source,
         y_axis.rows,
@@ -84,21 +84,31 @@ def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, 
     y_rows = np.empty((3, source.shape[0]))
     x_rows = np.empty((3, source.shape[1]))
     lines = np.empty((3, source.shape[1]))
+    blurs, values = np.empty(6, dtype=np.int64), np.empty((6, 3, 3))
     for k in range(s.size):
         top, left = (row[k] - 1) * stride, (column[k] - 1) * stride
         for a in range(3):
-            for pair in range(2):
-                blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
-                y_first, height = fill_rows(y_axis, blur, top, stride, y_rows)
-                x_first, width = fill_rows(x_axis, blur, left, stride, x_rows)
-                _add_products(
-                    source[y_first : y_first + height, x_first : x_first + width],
-                    y_rows[:, :height],
-                    x_rows[:, :width],
-                    lines,
-                    1.0 if pair == 0 else -1.0,
-                    cubes[k, a],
-                )
+            blurs[2 * a], blurs[2 * a + 1] = lower[s[k] - 1 + a], upper[s[k] - 1 + a]
+        for n in range(6):
+            blur, known = blurs[n], 0  # the upper Gaussian of a slice may be the lower of another
+            while blurs[known] != blur:
+                known += 1
+            if known < n:
+                values[n] = values[known]
+                continue
+            y_first, height = fill_rows(y_axis, blur, top, stride, y_rows)
+            x_first, width = fill_rows(x_axis, blur, left, stride, x_rows)
+            _set_products(
+                source[y_first : y_first + height, x_first : x_first + width],
+                y_rows[:, :height],
+                x_rows[:, :width],
+                lines,
+                values[n],
+            )
+        for a in range(3):
+            for b in range(3):
+                for c in range(3):
+                    cubes[k, a, b, c] = values[2 * a + 1, b, c] - values[2 * a, b, c]
 
 
 @njit(cache=True, nogil=True)
@@ -128,8 +138,8 @@ def _cosine_cubes(source, y_basis, x_basis, y_gains, x_gains, lower, upper, s, c
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _add_products(source, y_rows, x_rows, lines, sign, out):
-    """Add ``sign * y_rows @ source @ x_rows.T`` (3 x 3) to `out`, in a fixed order of sums.
+def _set_products(source, y_rows, x_rows, lines, out):
+    """Write ``y_rows @ source @ x_rows.T`` (3 x 3), in a fixed order of sums.
 
     `lines` is work space, shape (3, n) with at least as many columns as the source.
     """
@@ -165,12 +175,12 @@ def _add_products(source, y_rows, x_rows, lines, sign, out):
         a0, a1, a2 = a0 + a * x, a1 + a * y, a2 + a * z
         b0, b1, b2 = b0 + b * x, b1 + b * y, b2 + b * z
         c0, c1, c2 = c0 + c * x, c1 + c * y, c2 + c * z
-    out[0, 0] += sign * a0
-    out[0, 1] += sign * a1
-    out[0, 2] += sign * a2
-    out[1, 0] += sign * b0
-    out[1, 1] += sign * b1
-    out[1, 2] += sign * b2
-    out[2, 0] += sign * c0
-    out[2, 1] += sign * c1
-    out[2, 2] += sign * c2
+    out[0, 0] = a0
+    out[0, 1] = a1
+    out[0, 2] = a2
+    out[1, 0] = b0
+    out[1, 1] = b1
+    out[1, 2] = b2
+    out[2, 0] = c0
+    out[2, 1] = c1
+    out[2, 2] = c2
