@@ -144,12 +144,15 @@ def spline_nodes(axis: LocalAxis, p: int, begin: int, n_groups: int, dtype: type
 def _layout(rows, node, first, width):
     for blur in range(first.shape[0]):
         for g in range(first.shape[1]):
-            low, high = node[4 * g : 4 * g + 4].min(), node[4 * g : 4 * g + 4].max()
+            low = high = node[4 * g]
+            for k in range(4 * g, 4 * g + 4):
+                low, high = min(low, node[k]), max(high, node[k])
             first[blur, g], width[blur, g] = columns_of(rows, blur, low, high)
 
 
 @njit(cache=True, nogil=True)
 def _fill(rows, node, room, first, width, offset, entries):
+    one = np.int64(1)  # a constant would make another version of `fill_rows`
     for blur in range(first.shape[0]):
         for g in range(first.shape[1]):
             begin, left = offset[blur, g], first[blur, g]
@@ -162,7 +165,7 @@ def _fill(rows, node, room, first, width, offset, entries):
                         entries[begin + 4 * (start - left + k) + r] = room[r, k]
                 continue
             for r in range(4):
-                start, n = fill_rows(rows, blur, at[r], 1, room[:1])
+                start, n = fill_rows(rows, blur, at[r], one, room[:1])
                 for k in range(n):
                     entries[begin + 4 * (start - left + k) + r] = room[0, k]
 

@@ -104,10 +104,12 @@ def _dilate(values, other, step):
     """Raise every value to those that are a step away along both axes; `other` is work space."""
     high, wide = values.shape
     for v in range(high):
-        other[v] = values[v]
+        for u in range(wide):
+            other[v, u] = values[v, u]
         _raise_to(values[max(v - step, 0)], values[min(v + step, high - 1)], other[v])
     for v in range(high):
-        values[v] = other[v]
+        for u in range(wide):
+            values[v, u] = other[v, u]
         # What the ends lack does not matter: they are a margin away from all that is asked.
         _raise_to(other[v, : wide - 2 * step], other[v, 2 * step :], values[v, step : wide - step])
 

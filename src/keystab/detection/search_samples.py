@@ -8,7 +8,7 @@ from numba import njit
 from keystab.detection.search_expansion import slack_of
 from keystab.detection.search_hulls import CELLS, FAST, MARGIN, NODES
 from keystab.detection.search_records import GROUP, HELD, SINGLE_ROUNDING, TILE
-from keystab.detection.search_sums import four_columns, subtract
+from keystab.detection.search_sums import four_columns, largest_of, subtract
 
 # Candidates from which all samples of a tile are evaluated.
 _MOST_CANDIDATES = 1024
@@ -56,9 +56,9 @@ def search_samples(rows, blurred, lower, upper, band, off, tolerance, found, den
             left = ((x + MARGIN - 1) & (HELD - 1)) * NODES + MARGIN
             right = ((x + MARGIN + 1) & (HELD - 1)) * NODES + MARGIN
             for s in range(1, n_slices - 1):
-                own = 2 * SINGLE_ROUNDING * sizes[s].max()
+                own = 2 * SINGLE_ROUNDING * largest_of(sizes[s])
                 for k in range(3):
-                    other = 2 * SINGLE_ROUNDING * sizes[s - 1 + k].max()
+                    other = 2 * SINGLE_ROUNDING * largest_of(sizes[s - 1 + k])
                     least[k] = slack_of(tolerance, off[s] + off[s - 1 + k] + own + other)
                 finer, here, coarser = nodes[s - 1], nodes[s], nodes[s + 1]
                 _stand_out(

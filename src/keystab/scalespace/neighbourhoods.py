@@ -94,7 +94,9 @@ def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, 
             while blurs[known] != blur:
                 known += 1
             if known < n:
-                values[n] = values[known]
+                for b in range(3):
+                    for c in range(3):
+                        values[n, b, c] = values[known, b, c]
                 continue
             y_first, height = fill_rows(y_axis, blur, top, stride, y_rows)
             x_first, width = fill_rows(x_axis, blur, left, stride, x_rows)

@@ -350,7 +350,8 @@ def fill_rows(rows, blur, start, stride, out):
         for row in range(out.shape[0]):
             sample = start + row * stride
             shift = rows.first[table, sample] - first
-            out[row, shift : shift + wide] = rows.value[table, sample]
+            for k in range(wide):
+                out[row, shift + k] = rows.value[table, sample, k]
         return first, width
     taps, reach = rows.taps[blur], rows.reach[blur]
     blurred_spline_rows(start, stride, taps, reach, rows.splines, first, out[:, :width])
