@@ -22,6 +22,7 @@ from keystab.scalespace.interpolants import Interpolant, interpolant
 from keystab.scalespace.rounding import Rounding
 from keystab.scalespace.sampling import Sampling, balanced_delta
 from keystab.utils import memory
+from keystab.utils.compiled_loops import tell_of_compilation
 from keystab.utils.masks import unmasked
 from keystab.utils.one_thread import one_thread
 
@@ -329,6 +330,7 @@ def scale_space(
     """
     interpolant(oversampling)
     array = checked_image(image)
+    tell_of_compilation()
     if delta_min is None:
         delta_min = balanced_delta(n_spo, kappa, sigma_min)
     sampling = Sampling(
