@@ -267,7 +267,8 @@ def decided(space: ScaleSpace, candidates: np.ndarray, tolerance: float) -> Deci
         Their neighbourhoods.
     """
     places = np.stack(np.unravel_index(np.unique(numbered(space, candidates)), space.shape), axis=1)
-    cubes = space.neighbourhoods(*places.T)
+    s, row, column = places.T
+    cubes = space.neighbourhoods(s, row, column, tolerance)
     around = cubes.reshape(-1, 27)
     difference = np.delete(around[:, 13:14] - around, 13, axis=1)
     sign = (difference > tolerance).all(axis=1).astype(np.int64)

@@ -217,7 +217,9 @@ class ScaleSpace:
             for column in range(self.n_tiles[1]):
                 yield row, column, self.tile(row, column)
 
-    def neighbourhoods(self, s: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    def neighbourhoods(
+        self, s: np.ndarray, row: np.ndarray, column: np.ndarray, tolerance: float = -1.0
+    ) -> np.ndarray:
         """Cubes of 3 x 3 x 3 samples around given samples.
 
         Each cube is evaluated by itself, so that its digits depend on the image and the sampling
@@ -227,6 +229,9 @@ class ScaleSpace:
         ----------
         s, row, column : ndarray of int, shape (n,)
             Indices of the centres, at least one sample away from every end.
+        tolerance : float
+            From 0 on, cubes whose centre does not differ by more from all others, one way, may
+            lack slices: these are NaN.
 
         Returns
         -------
@@ -235,7 +240,9 @@ class ScaleSpace:
         """
         indices = [np.ascontiguousarray(i, dtype=np.int64) for i in (s, row, column)]
         _, lower, upper = self.blurs
-        return self.interpolant.neighbourhoods(self.source, self.axes, lower, upper, *indices)
+        return self.interpolant.neighbourhoods(
+            self.source, self.axes, lower, upper, *indices, tolerance=tolerance
+        )
 
     @cached_property
     def largest(self) -> float:
