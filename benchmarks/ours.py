@@ -58,8 +58,7 @@ def forget_operators() -> None:
         search_nodes.local_axis,
         search_lattice._nodes,
         search_lattice._kinked,
-        search_cosine.interpolation,
-        search_cosine.band_limited_basis,
+        search_cosine.continued_axis,
     ):
         kept.cache_clear()
 

@@ -89,3 +89,18 @@ def test_the_library_forgets_when_it_is_used_and_not_when_it_is_imported(code, f
     )
     assert str(tmp_path) in run.stdout
     assert old.exists() is not forgotten
+
+
+def test_whoever_waits_for_the_compiler_is_told_once_and_nobody_else(tmp_path):
+    code = (
+        "import numpy as np, keystab; space = keystab.scale_space(np.eye(12), 1.1, 3); space.source"
+    )
+    variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
+        ).stderr
+        for _ in range(2)
+    ]
+    assert told[0].count("compiles its loops") == 1 and told[0].count("\n") == 1
+    assert told[1] == ""

@@ -79,18 +79,22 @@ KINDS = [
     st.sampled_from([0.0, 1.19e-7, 1e-5, 1e-3]),
     st.integers(1, 6),
     st.integers(0, 1),
+    st.sampled_from(["spline", "cosine"]),
 )
-def test_whatever_the_picture(kind, seed, height, width, n_spo, epsilon, p, octave):  # noqa: PLR0913
+def test_whatever_the_picture(  # noqa: PLR0913
+    kind, seed, height, width, n_spo, epsilon, p, octave, oversampling
+):
     image = picture(kind, (height, width), seed)
-    space = scale_space(image, 1.1, n_spo, octave=octave)
+    space = scale_space(image, 1.1, n_spo, octave=octave, oversampling=oversampling)
     tolerance = max(epsilon * np.ptp(image), space.rounding)
     p = max(1, min(p, min(space.shape[1:]) // 10))
     assert of_few(space, tolerance, p).tolist() == of_all(space, tolerance).tolist()
 
 
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
 @pytest.mark.parametrize("n_spo", range(3, 20))
-def test_all_samplings(n_spo):
-    space = scale_space(blobs((26, 30), n_spo), 1.1, n_spo)
+def test_all_samplings(n_spo, oversampling):
+    space = scale_space(blobs((26, 30), n_spo), 1.1, n_spo, oversampling=oversampling)
     plain = of_all(space, space.rounding)
     assert len(plain) > 3
     for p in {1, 1 + n_spo // 4}:
@@ -109,8 +113,10 @@ def test_all_samplings(n_spo):
     ],
     ids=str,
 )
-def test_whatever_the_sampling(options):
-    space = scale_space(blobs((33, 38), 2), **{"camera_blur": 1.1, "n_spo": 15} | options)
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
+def test_whatever_the_sampling(options, oversampling):
+    options = {"camera_blur": 1.1, "n_spo": 15, "oversampling": oversampling} | options
+    space = scale_space(blobs((33, 38), 2), **options)
     plain = of_all(space, space.rounding)
     assert of_few(space, space.rounding, 3).tolist() == plain.tolist()
     assert len(plain) > 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -13,11 +14,12 @@ from keystab.detection.refinement import (
     HESSIAN_COLUMNS,
     MOST_MODELS,
     MOVES,
+    Columns,
     positions_of,
     quadratic_model,
-    refined_table,
+    refined,
     stationary_point,
-    trace,
+    traced,
 )
 from keystab.errors import InputError
 from keystab.scalespace.dog import ScaleSpace, checked_image, scale_space
@@ -141,28 +143,21 @@ def detect_keypoints(
         space = scale_space(
             image, camera_blur, n_spo, delta_min, sigma_min, kappa, oversampling, octave, slices
         )
-        table = extrema_table(space, *extrema_and_cubes(space, epsilon, threads))
+        table = described(space, *extrema_and_cubes(space, epsilon, threads))
         scale = table["step_sigma"]
         if refine:
-            models = trace(
-                space,
-                table,
-                max_offset=max_offset,
-                move=move,
-                scale_moves=scale_moves,
-                max_models=int(min(max_iterations, MOST_MODELS)),
-            )
-            table = refined_table(space.sampling, table, models, max_offset, max_iterations)
+            most = int(min(max_iterations, MOST_MODELS))
+            models = traced(space, table, max_offset, move, scale_moves, most)
+            table = refined(space.sampling, table, models, max_offset, max_iterations)
             scale = table["sigma"]
-        table["s"] += slices[0]
-        octaves.append(table.assign(octave=octave, scale=scale, step=space.sampling.step))
+        table |= {"octave": np.full(scale.size, octave), "scale": scale}
+        table |= {"s": table["s"] + slices[0], "step": np.full(scale.size, space.sampling.step)}
+        octaves.append(table)
     keep = without_seams(octaves, n_spo, sigma_min)
     names = ["y", "x", "sigma", "value", "sign", "octave", "s", "row", "column", "difference"]
     names += ["models"] if refine else []
     kept = {
-        name: np.concatenate(
-            [table[name].to_numpy()[mask] for table, mask in zip(octaves, keep, strict=True)]
-        )
+        name: np.concatenate([table[name][mask] for table, mask in zip(octaves, keep, strict=True)])
         for name in names
     }
     return pd.DataFrame(kept)
@@ -221,6 +216,13 @@ def extrema_table(
         quadratic step leads: ``step_y, step_x, step_sigma, step_value`` (NaN for a singular
         Hessian).
     """
+    return pd.DataFrame(described(space, extrema, cubes))
+
+
+def described(
+    space: ScaleSpace, extrema: np.ndarray, cubes: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """As `extrema_table`, as columns."""
     s, row, column, sign = extrema.T
     if cubes is None:
         cubes = space.neighbourhoods(s, row, column)
@@ -232,31 +234,29 @@ def extrema_table(
     gradient, hessian = quadratic_model(cubes)
     alpha = stationary_point(gradient, hessian)
     step = positions_of((s, row, column), alpha.T, space.sampling)
-    return pd.DataFrame(
-        {
-            "y": row * space.sampling.step,
-            "x": column * space.sampling.step,
-            "sigma": space.sigma[s],
-            "value": value,
-            "sign": sign,
-            "s": s,
-            "row": row,
-            "column": column,
-            "difference": difference,
-            **{name: gradient[:, i] for name, i in GRADIENT_COLUMNS.items()},
-            **{name: hessian[:, i, j] for name, (i, j) in HESSIAN_COLUMNS.items()},
-            **{f"step_{name}": place for name, place in step.items()},
-            "step_value": value + 0.5 * np.einsum("ni,ni->n", gradient, alpha),
-        }
-    )
+    return {
+        "y": row * space.sampling.step,
+        "x": column * space.sampling.step,
+        "sigma": space.sigma[s],
+        "value": value,
+        "sign": sign,
+        "s": s,
+        "row": row,
+        "column": column,
+        "difference": difference,
+        **{name: gradient[:, i] for name, i in GRADIENT_COLUMNS.items()},
+        **{name: hessian[:, i, j] for name, (i, j) in HESSIAN_COLUMNS.items()},
+        **{f"step_{name}": place for name, place in step.items()},
+        "step_value": value + 0.5 * np.einsum("ni,ni->n", gradient, alpha),
+    }
 
 
-def without_seams(octaves: list[pd.DataFrame], n_spo: int, sigma_min: float) -> list[np.ndarray]:
+def without_seams(octaves: Sequence[Columns], n_spo: int, sigma_min: float) -> list[np.ndarray]:
     """Decide which detections each octave reports, see the notes of `detect_keypoints`.
 
     Parameters
     ----------
-    octaves : list of DataFrame
+    octaves : list of dict
         Columns ``y, x, sign, s`` (0 for the first slice of the octave), ``scale`` in pixels and
         ``step``, the sampling step of the octave.
     n_spo, sigma_min
@@ -269,19 +269,19 @@ def without_seams(octaves: list[pd.DataFrame], n_spo: int, sigma_min: float) -> 
     """
     keep = []
     for octave, table in enumerate(octaves):
-        s = table["s"].to_numpy()
+        s = table["s"]
         first, last = octave == 0, octave == len(octaves) - 1
         keep.append(((s >= 1) | first) & ((s <= n_spo) | last))
     for octave in range(len(octaves) - 1):
         finer, coarser = octaves[octave], octaves[octave + 1]
         seam = sigma_min * 2.0 ** (octave + 1 + 0.5 / n_spo)
         for i, j in _same_extremum(finer, coarser, n_spo):
-            below = bool(finer["scale"].iloc[i] < seam)
+            below = bool(finer["scale"][i] < seam)
             keep[octave][i], keep[octave + 1][j] = below, not below
     return keep
 
 
-def _same_extremum(finer: pd.DataFrame, coarser: pd.DataFrame, n_spo: int) -> list[tuple[int, int]]:
+def _same_extremum(finer: Columns, coarser: Columns, n_spo: int) -> list[tuple[int, int]]:
     """Pairs of detections at the seam of two octaves that are one extremum, each nearest."""
     from scipy.spatial import cKDTree  # costs a third of the import, and one octave has no seam
 
@@ -290,14 +290,14 @@ def _same_extremum(finer: pd.DataFrame, coarser: pd.DataFrame, n_spo: int) -> li
     if not (i.size and j.size):
         return []
     # Positions in units of the match: 1.5 coarse samples, one scale step; signs kept apart.
-    step = coarser["step"].iloc[0]
+    step = coarser["step"][0]
     points = [
         np.stack(
             [
-                table["y"].iloc[k] / (1.5 * step),
-                table["x"].iloc[k] / (1.5 * step),
-                np.log2(table["scale"].iloc[k]) * n_spo,
-                10.0 * table["sign"].iloc[k],
+                table["y"][k] / (1.5 * step),
+                table["x"][k] / (1.5 * step),
+                np.log2(table["scale"][k]) * n_spo,
+                10.0 * table["sign"][k],
             ],
             axis=1,
         )

@@ -13,20 +13,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
 import numpy as np
-import threadpoolctl
 from numba import njit
 
-from keystab.detection.search_cosine import BandLimitedSearch
-from keystab.detection.search_lattice import LatticeSearch
+from keystab.detection.search_lattice import LatticeSearch, applies
 from keystab.errors import InputError
 from keystab.scalespace.axis import Block
 from keystab.scalespace.dog import ScaleSpace, ranges
 from keystab.utils import memory, validation
+from keystab.utils.one_thread import one_thread
 from keystab.utils.progress import progress, progress_if_watched
 
 # Blocks in which extrema are sought: flat ones, because the number of source rows that a block
@@ -41,9 +40,6 @@ BAND_ROWS = 8192
 # Samples that one search may meet: 40 minutes of one core for the spline at n_spo = 15, and hours
 # where all samples are evaluated.
 MOST_SAMPLES = 10**12
-
-SearchOfFew = type[LatticeSearch] | type[BandLimitedSearch]
-_SEARCHES: dict[str, SearchOfFew] = {"spline": LatticeSearch, "cosine": BandLimitedSearch}
 
 Decided = tuple[np.ndarray, np.ndarray]
 """Extrema, shape (n, 4), and their cubes of samples, shape (n, 3, 3, 3)."""
@@ -113,7 +109,7 @@ def extrema_and_cubes(
     what = f"extrema, n_spo {space.sampling.n_spo}"
     report = progress if show_progress else progress_if_watched
     found = [decided(space, np.empty((0, 4), dtype=np.int64), tolerance)]
-    with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
+    with one_thread(), _workers(threads) as pool:
         for find, columns in _searches(space, tolerance, pool, threads, asked):
             candidates = pool.map(find, columns)
             # Decided once all columns are given out: short tasks for threads that have none left.
@@ -125,9 +121,29 @@ def extrema_and_cubes(
     extrema, cubes = (np.concatenate(parts) for parts in zip(*found, strict=True))
     found.clear()
     # Blocks may overlap by the samples that have no neighbours in one of them.
-    extrema, first = np.unique(extrema, axis=0, return_index=True)
-    inside = within(extrema, window)
-    return extrema[inside], cubes[first[inside]]
+    _, first = np.unique(numbered(space, extrema), return_index=True)
+    first = first[within(extrema[first], window)]
+    return extrema[first], cubes[first]
+
+
+def numbered(space: ScaleSpace, places: np.ndarray) -> np.ndarray:
+    """Numbers of samples, by slice, row and column: single ones are sorted faster than rows."""
+    number: np.ndarray = np.ravel_multi_index(tuple(places[:, :3].T), space.shape)
+    return number
+
+
+class _Caller(Executor):
+    """Calls at once what a pool of one thread would call, without the thread."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """The result of a call."""
+        done: Future[Any] = Future()
+        done.set_result(fn(*args, **kwargs))
+        return done
+
+
+def _workers(threads: int) -> Executor:
+    return _Caller() if threads == 1 else ThreadPoolExecutor(threads)
 
 
 def _require_an_end(space: ScaleSpace, threads: int, asked: tuple[slice, slice]) -> None:
@@ -167,25 +183,18 @@ def within(extrema: np.ndarray, window: tuple[slice, slice] | None) -> np.ndarra
     return inside
 
 
-def search_of_few(space: ScaleSpace) -> SearchOfFew | None:
-    """Search that needs few samples of a scale-space; None where all of them are evaluated."""
-    search = _SEARCHES[space.oversampling]
-    return search if search.applies(space) else None
-
-
 def _searches(
     space: ScaleSpace,
     tolerance: float,
-    pool: ThreadPoolExecutor,
+    pool: Executor,
     threads: int,
     window: tuple[slice, slice],
 ) -> Iterator[tuple[Callable[[Any], np.ndarray], Sequence[Any]]]:
     """What finds the candidates of parts of the samples, and the parts, band by band."""
     columns = list(ranges(window[1].start, window[1].stop, BLOCK_COLUMNS))
-    search = search_of_few(space)
     for top, bottom in ranges(window[0].start, window[0].stop, BAND_ROWS):
-        if search is not None:
-            few = search(space, tolerance, (slice(top, bottom), window[1]), threads)
+        if applies(space):
+            few = LatticeSearch(space, tolerance, (slice(top, bottom), window[1]), threads)
             yield partial(_found_by, few), few.parts
         else:
             rows = list(ranges(top, bottom, BLOCK_ROWS))
@@ -193,7 +202,7 @@ def _searches(
             yield partial(_evaluated, space, rows, along, tolerance), columns
 
 
-def _found_by(search: LatticeSearch | BandLimitedSearch, part: Any) -> np.ndarray:
+def _found_by(search: LatticeSearch, part: Any) -> np.ndarray:
     """Candidates of one part, from few samples and a bound on what lies between."""
     candidates, undecided = search.candidates(part)
     rest = []
@@ -257,8 +266,9 @@ def decided(space: ScaleSpace, candidates: np.ndarray, tolerance: float) -> Deci
     cubes : ndarray, shape (m, 3, 3, 3)
         Their neighbourhoods.
     """
-    places = np.unique(candidates[:, :3], axis=0)
-    cubes = space.neighbourhoods(*places.T)
+    places = np.stack(np.unravel_index(np.unique(numbered(space, candidates)), space.shape), axis=1)
+    s, row, column = places.T
+    cubes = space.neighbourhoods(s, row, column, tolerance)
     around = cubes.reshape(-1, 27)
     difference = np.delete(around[:, 13:14] - around, 13, axis=1)
     sign = (difference > tolerance).all(axis=1).astype(np.int64)
@@ -282,9 +292,8 @@ def bytes_of_search(space: ScaleSpace, threads: int = 1) -> float:
     strips = 2.0 * n_blurs * BLOCK_COLUMNS * height * threads
     axes = 8 * sum(sampling.base_grid_shape)
     blocks = 6 * n_blurs * BLOCK_ROWS * BLOCK_COLUMNS * threads
-    if search := search_of_few(space):
-        of_band, of_strips = search.shares_of_memory(n_blurs)
-        band, strips = band * of_band, strips * of_strips
+    if applies(space):
+        band, strips = band / 3, strips / 3
     return 8.0 * (6 * height * width + axes + blocks + band + strips)
 
 

@@ -9,7 +9,7 @@ neighbours; its extremum lies at ``alpha = -H^{-1} g`` grid steps. It is accepte
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +22,15 @@ from keystab.utils import validation
 
 if TYPE_CHECKING:
     from keystab.scalespace.dog import ScaleSpace
+
+Columns = Mapping[str, np.ndarray]
+"""A table as arrays by name: where tables are small, making a DataFrame takes most of the time."""
+
+
+def columns_of(table: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Columns of a table as arrays."""
+    return {str(name): column.to_numpy() for name, column in table.items()}
+
 
 MOVES = ("nearest", "unit_step")
 
@@ -92,8 +101,13 @@ def stationary_point(gradient: np.ndarray, hessian: np.ndarray) -> np.ndarray:
     ndarray, shape (n, 3)
         Offsets in grid steps; NaN where the Hessian is singular.
     """
-    a, b, c = hessian[:, 0], hessian[:, 1], hessian[:, 2]
-    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-1)
+    rows = hessian.transpose(1, 2, 0)
+    a, cofactors = hessian[:, 0], np.empty(hessian.shape)
+    for k in range(3):  # np.cross says the same, and takes longer than a hundred models
+        x, y = rows[(k + 1) % 3], rows[(k + 2) % 3]
+        for i in range(3):
+            u, v = (i + 1) % 3, (i + 2) % 3
+            cofactors[:, i, k] = x[u] * y[v] - x[v] * y[u]
     determinant = np.einsum("ni,ni->n", a, cofactors[:, :, 0])
     with np.errstate(divide="ignore", invalid="ignore"):
         offset: np.ndarray = -np.einsum("nij,nj->ni", cofactors, gradient) / determinant[:, None]
@@ -143,8 +157,22 @@ def trace(
     grid or the slices of the octave), where it would stay, and where it returns to a sample that
     it has seen, since from there it only repeats itself.
     """
+    return pd.DataFrame(
+        traced(space, columns_of(extrema), max_offset, move, scale_moves, max_models)
+    )
+
+
+def traced(
+    space: ScaleSpace,
+    extrema: Columns,
+    max_offset: float,
+    move: str,
+    scale_moves: bool,
+    max_models: int,
+) -> dict[str, np.ndarray]:
+    """As `trace`, from and to columns."""
     _check(move, max_offset, max_models)
-    here = np.stack([extrema[name].to_numpy() for name in ("s", "row", "column")], axis=1)
+    here = np.stack([extrema[name] for name in ("s", "row", "column")], axis=1)
     here = here.astype(np.int64)
     centre, gradient, hessian = _first_model(extrema)
     keypoint = np.arange(here.shape[0])
@@ -172,19 +200,16 @@ def trace(
             break
         keypoint, here = keypoint[goes_on], there[goes_on]
         seen = [earlier[goes_on] for earlier in seen]
-    # One table at the end: each takes longer than some hundred models.
     of, number, place, alpha, value = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.lexsort((number, of))
     place, alpha = place[order], alpha[order]
-    return pd.DataFrame(
-        {
-            "keypoint": of[order],
-            "model": number[order],
-            **dict(zip(("s", "row", "column"), place.T, strict=True)),
-            **dict(zip(("alpha_s", "alpha_y", "alpha_x"), alpha.T, strict=True)),
-            "value": value[order],
-        }
-    )
+    return {
+        "keypoint": of[order],
+        "model": number[order],
+        **dict(zip(("s", "row", "column"), place.T, strict=True)),
+        **dict(zip(("alpha_s", "alpha_y", "alpha_x"), alpha.T, strict=True)),
+        "value": value[order],
+    }
 
 
 def accepted(trace: pd.DataFrame, max_offset: float, max_iterations: float) -> pd.DataFrame:
@@ -205,18 +230,18 @@ def accepted(trace: pd.DataFrame, max_offset: float, max_iterations: float) -> p
         The rows of `trace` of the first model of each keypoint with ``max|alpha| < max_offset``
         among its first `max_iterations`; keypoints without one are discarded.
     """
-    return trace.iloc[_first_accepted(trace, max_offset, max_iterations)].reset_index(drop=True)
+    return trace.iloc[_first_accepted(columns_of(trace), max_offset, max_iterations)].reset_index(
+        drop=True
+    )
 
 
-def _first_accepted(
-    trace: pd.DataFrame, max_offset: float, max_iterations: float
-) -> NDArray[np.int64]:
+def _first_accepted(trace: Columns, max_offset: float, max_iterations: float) -> NDArray[np.int64]:
     """Rows of a trace at which keypoints are accepted, in their order."""
-    alpha = (np.abs(trace[name].to_numpy()) for name in ("alpha_s", "alpha_y", "alpha_x"))
+    alpha = (np.abs(trace[name]) for name in ("alpha_s", "alpha_y", "alpha_x"))
     good = np.max(list(alpha), axis=0) < max_offset  # of what is not a number, none is less
-    good &= trace["model"].to_numpy() <= max_iterations
+    good &= trace["model"] <= max_iterations
     rows = np.flatnonzero(good)
-    return np.sort(rows[np.unique(trace["keypoint"].to_numpy()[rows], return_index=True)[1]])
+    return np.sort(rows[np.unique(trace["keypoint"][rows], return_index=True)[1]])
 
 
 def positions(models: pd.DataFrame, sampling: Sampling) -> pd.DataFrame:
@@ -244,13 +269,14 @@ def positions_of(
     }
 
 
-def _first_model(extrema: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _first_model(extrema: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Value, gradient and Hessian at the discrete extrema, from their table."""
-    hessian = np.empty((len(extrema), 3, 3))
+    value = extrema["value"]
+    hessian = np.empty((value.size, 3, 3))
     for name, (i, j) in HESSIAN_COLUMNS.items():
-        hessian[:, i, j] = hessian[:, j, i] = extrema[name].to_numpy()
-    gradient = np.stack([extrema[name].to_numpy() for name in GRADIENT_COLUMNS], axis=1)
-    return extrema["value"].to_numpy(), gradient, hessian
+        hessian[:, i, j] = hessian[:, j, i] = extrema[name]
+    gradient = np.stack([extrema[name] for name in GRADIENT_COLUMNS], axis=1)
+    return value, gradient, hessian
 
 
 def _step(alpha: np.ndarray, max_offset: float, move: str) -> np.ndarray:
@@ -298,21 +324,31 @@ def refined_table(
         ``difference`` of the discrete extremum, the number of ``models``, and ``keypoint``, the
         row in `extrema`.
     """
+    columns = columns_of(extrema), columns_of(models)
+    return pd.DataFrame(refined(sampling, *columns, max_offset, max_iterations))
+
+
+def refined(
+    sampling: Sampling,
+    extrema: Columns,
+    models: Columns,
+    max_offset: float,
+    max_iterations: float,
+) -> dict[str, np.ndarray]:
+    """As `refined_table`, from and to columns."""
     rows = _first_accepted(models, max_offset, max_iterations)
-    good = {name: column.to_numpy()[rows] for name, column in models.items()}
+    good = {name: column[rows] for name, column in models.items()}
     of = good["keypoint"]
     names = ["sign", "s", "row", "column", "difference"]
     place = [good[name] for name in ("s", "row", "column")]
     alpha = [good[name] for name in ("alpha_s", "alpha_y", "alpha_x")]
-    return pd.DataFrame(
-        {
-            **positions_of(place, alpha, sampling),
-            "value": good["value"],
-            **{name: extrema[name].to_numpy()[of] for name in names},
-            "models": good["model"],
-            "keypoint": of,
-        }
-    )
+    return {
+        **positions_of(place, alpha, sampling),
+        "value": good["value"],
+        **{name: extrema[name][of] for name in names},
+        "models": good["model"],
+        "keypoint": of,
+    }
 
 
 def refined_keypoints(

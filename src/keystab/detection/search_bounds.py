@@ -19,19 +19,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from keystab.detection.search_field import Field
 from keystab.detection.search_functionals import functionals
 from keystab.detection.search_hulls import CELLS
-from keystab.detection.search_nodes import LocalAxis
 from keystab.detection.search_norms import REACH, Ends, Mixes, Norms, spline_ends, spline_norms
 from keystab.detection.search_records import BLOCK, SINGLE_ROUNDING, STENCIL, Bounds
 from keystab.detection.search_rings import (
-    Places,
     at_ends,
     largest_fourth,
     mark_flat,
+    places_of,
     write_rings,
 )
-from keystab.scalespace.dog import ScaleSpace
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -155,26 +154,50 @@ def _outer(one: Array, other: Array) -> Array:
     return product
 
 
-def off_at_nodes(space: ScaleSpace, axes: tuple[LocalAxis, LocalAxis]) -> Array:
+def off_at_nodes(field: Field) -> Array:
     """How far nodes may be from samples, per unit of the source, shape (n_slices,).
 
     Rows of nodes lack what rings. Sums along x are of products in single precision: of terms that
     are rounded twice, four at a time, which are added up.
     """
-    _, lower, upper = space.blurs
-    columns = 2 * axes[1].rows.reach * space.sampling.delta_min + 8
+    y_axis, x_axis = field.axes
+    columns = 2 * x_axis.rows.reach * field.delta + 8
     rounding = (8 + np.ceil(columns / 4)) * SINGLE_ROUNDING
-    off = 1.1 * (axes[0].lacking + axes[1].lacking) + rounding
-    return off[lower] + off[upper]
+    off = 1.1 * (y_axis.lacking + x_axis.lacking) + rounding
+    return off[field.lower] + off[field.upper]
 
 
-class SplineBounds:
-    """Bounds for cells of a spline scale-space.
+def _of_slices(
+    sizes: Array, n_kinked: int, hermite: tuple[float, float], wide: tuple[float, float]
+) -> Array:
+    """What the sizes of slices add to all bounds.
 
     Parameters
     ----------
-    space : ScaleSpace
-    axes : (LocalAxis, LocalAxis)
+    sizes : ndarray, shape (n_slices,)
+    n_kinked : int
+        See `products`.
+    hermite, wide : (float, float)
+        Factors of differences within a slice, and of those to the next one.
+    """
+    steps = np.append(sizes[:-1] + sizes[1:], 0.0)
+    many = sizes.size
+    parts = [(hermite, many), (wide, many)] + ([(wide, n_kinked + 1)] if n_kinked else [])
+    return np.concatenate(
+        [
+            factor * each[:n]
+            for (within, to_next), n in parts
+            for factor, each in ((within, sizes), (within, sizes), (to_next, steps))
+        ]
+    )
+
+
+class SplineBounds:
+    """Bounds for cells of what is searched.
+
+    Parameters
+    ----------
+    field : Field
     p : int
         Samples from one node to the next.
     n_cells : (int, int)
@@ -185,16 +208,14 @@ class SplineBounds:
 
     def __init__(
         self,
-        space: ScaleSpace,
-        axes: tuple[LocalAxis, LocalAxis],
+        field: Field,
         p: int,
         n_cells: tuple[int, int],
         n_kinked: int,
     ) -> None:
-        self.source, self.rounding = space.source, space.rounding_bounds.value
-        sampling = space.sampling
-        blurs, lower, upper = space.blurs
-        delta, spacing = sampling.delta_min, p * sampling.step
+        self.source, axes, delta = field.source, field.axes, field.delta
+        blurs, lower, upper = field.blurs, field.lower, field.upper
+        spacing = p * field.step
         block = BLOCK * spacing
         # Beyond this lies what rings, bounded by the largest of all.
         widest = 9.0 * blurs[-1] + STENCIL * spacing + 2 * REACH
@@ -220,34 +241,26 @@ class SplineBounds:
         padded[:, :, : rings.shape[2]] = rings
         self.weights = padded.reshape(len(rings), -1)
         self.ends_y, self.ends_x = (each.astype(np.float32) for each in (ends_y, ends_x))
-        mirrors = [(-delta / 2, (axis.rows.n_samples - 0.5) * delta) for axis in axes]
         self.places = [
-            Places.of(n, block, mirror, many, self.margin)
-            for n, mirror, many in zip(sampling.shape, mirrors, n_blocks, strict=True)
+            places_of(axis, block, many, self.margin)
+            for axis, many in zip(axes, n_blocks, strict=True)
         ]
         # Polynomials add some nodes up.
-        off = off_at_nodes(space, axes)
-        self.least_off = float(off.min())  # nodes are also off by what samples are
+        off = off_at_nodes(field)
+        self.least_off = float(off.min())  # nodes are rounded in double precision too
         of_value, of_step, of_wide, of_wide_step = (
             float(each.sum(axis=1).max()) for each in functionals(p).nodes
         )
-        step = np.append(off[:-1] + off[1:], 0.0)
-        sharp = [2 * of_wide_step * of_wide * off[: n_kinked + 1]] * 2
-        sharp += [of_wide**2 * step[: n_kinked + 1]]
-        self.of_node = np.concatenate(
-            [13.5 * off] * 2
-            + [of_value**2 * step]
-            + [2 * of_wide_step * of_wide * off] * 2
-            + [of_wide**2 * step]
-            + (sharp if n_kinked else [])
-        )
-        self.of_sample = np.full(self.of_node.size, 2.0)
-        self.of_sample[: 2 * off.size] = 2 * p
+        wide = (2 * of_wide_step * of_wide, of_wide**2)
+        self.of_node = _of_slices(off, n_kinked, (13.5, of_value**2), wide)
+        self.of_sample = _of_slices(field.missed, n_kinked, (2.0 * p, 1.0), (2.0, 1.0))
+        self.rounding = field.rounding
+        self.missed = float(field.missed.max()) - field.rounding
         self.most = [largest_fourth(source) for source in (self.source, self.source.T)]
         self.ends = [
-            at_ends(source, mirror, places, self.steps, self.margin).astype(np.float32)
-            for source, mirror, places in zip(
-                (self.source, self.source.T), mirrors, self.places[::-1], strict=True
+            at_ends(source, axis.mirrors, places, self.steps, self.margin).astype(np.float32)
+            for source, axis, places in zip(
+                (self.source, self.source.T), axes, self.places[::-1], strict=True
             )
         ]
 
@@ -263,7 +276,8 @@ class SplineBounds:
         amplitude : float
             Largest absolute value of the source as the nodes see it.
         tolerance : float
-            Where the source varies by less than an eighth of this, blocks are flat.
+            Where the source varies by less than an eighth of this, less what samples of two slices
+            may be off, blocks are flat.
         """
         margin, n_y = self.margin, CELLS // BLOCK
         rows, begin_y = self.places[0].part(first_y, n_y, margin)
@@ -289,9 +303,9 @@ class SplineBounds:
                 near[axis],
                 rings[:, axis * n_rings : (axis + 1) * n_rings],
             )
-        mark_flat(self.source, rows, begin_y, columns, begin_x, self.steps, tolerance / 8, flat)
-        off = (amplitude + self.rounding / self.least_off) * self.of_node
-        off += self.rounding * self.of_sample
+        flat_below = (tolerance - 2 * self.missed) / 8
+        mark_flat(self.source, rows, begin_y, columns, begin_x, self.steps, flat_below, flat)
+        off = (amplitude + self.rounding / self.least_off) * self.of_node + self.of_sample
         return Bounds(
             off.astype(np.float32),
             weights,

@@ -31,7 +31,7 @@ from keystab.detection.search_records import (
     STENCIL,
     TILE,
 )
-from keystab.detection.search_sums import four_columns, subtract
+from keystab.detection.search_sums import four_columns, largest_of, subtract
 
 # How often single precision is met at most in a derivative and in a difference of slices, in units
 # of the largest node nearby.
@@ -101,7 +101,9 @@ def search_cells(  # noqa: PLR0913
         np.zeros((LANES, 8)),
     )
     nine = np.zeros((3, 3, 1))
-    count = begun = waiting = close = expanded = 0
+    # Numbers of a type: a constant would make another version of every loop that is given it.
+    count = begun = waiting = close = expanded = np.int64(0)
+    lanes, none = np.int64(LANES), np.int64(0)
     n_groups = -(-(n_cells + 2 * MARGIN) // GROUP)
     for g in range(n_groups):
         for blur in range(blurred.shape[0]):
@@ -114,17 +116,17 @@ def search_cells(  # noqa: PLR0913
             high, low = gaussians[upper[s]].reshape(-1), gaussians[lower[s]].reshape(-1)
             sizes[s, g % sizes.shape[1]] = subtract(high, low, nodes[s, begin:], room)
             if s < kinked.n:
-                uppers[s, begin : begin + GROUP * NODES] = high
-            largest[s] = sizes[s].max()
+                _copy(high, uppers[s, begin:])
+            largest[s] = largest_of(sizes[s])
         # Cells between the columns of nodes `left` and `left + 1` are cells number `left` - MARGIN.
         first = GROUP * (g - 1)
         if first < MARGIN:
             if first == 0:
-                _advance(pairs, nodes, MARGIN)
+                _advance(pairs, nodes, np.int64(MARGIN))
             continue
         tile = (first - MARGIN) // TILE
         if (first - MARGIN) % TILE == 0:
-            begun, expanded = count, 0
+            begun, expanded = count, none
         own = g & 1
         _bounds_of_column(bounds, (first - MARGIN) // BLOCK, column_bounds[own])
         _set_least(least, column_bounds[own], bounds.flat[(first - MARGIN) // BLOCK], largest)
@@ -156,35 +158,42 @@ def search_cells(  # noqa: PLR0913
                         kept = look_into(
                             cells, waiting, nodes, column_bounds, largest, tolerance, rooms
                         )
-                        waiting = 0
-                        closer[close : close + kept] = cells[:kept]
+                        waiting = none
+                        _copy(cells[:kept].reshape(-1), closer[close:].reshape(-1))
                         close += kept
                         if close >= LANES:
                             count = look_closely(
-                                closer, LANES, nodes, uppers, weights, column_bounds, largest,
+                                closer, lanes, nodes, uppers, weights, column_bounds, largest,
                                 tolerance, band, kinked, rooms, nine, found, count,
                             )  # fmt: skip
-                            close -= LANES
-                            closer[:close] = closer[LANES : LANES + close]
+                            close -= lanes
+                            _copy(closer[lanes : lanes + close].reshape(-1), closer.reshape(-1))
         # Nodes of this group's cells are still held when the next group has been searched.
         last = g == n_groups - 1 or (GROUP * (g - 1)) % TILE == 0
         if waiting > 0 and (g % 2 == 0 or last):
             expanded += waiting
             kept = look_into(cells, waiting, nodes, column_bounds, largest, tolerance, rooms)
-            waiting = 0
-            closer[close : close + kept] = cells[:kept]
+            waiting = none
+            _copy(cells[:kept].reshape(-1), closer[close:].reshape(-1))
             close += kept
         while close > 0 and (g % 2 == 0 or last):
             count = look_closely(
-                closer, min(close, LANES), nodes, uppers, weights, column_bounds, largest,
+                closer, min(close, lanes), nodes, uppers, weights, column_bounds, largest,
                 tolerance, band, kinked, rooms, nine, found, count,
             )  # fmt: skip
-            close = max(close - LANES, 0)
-            closer[:close] = closer[LANES : LANES + close]
+            close = max(close - lanes, none)
+            _copy(closer[lanes : lanes + close].reshape(-1), closer.reshape(-1))
         if count - begun > _MOST_CANDIDATES or expanded > _MOST_EXPANDED * CELLS * TILE * n_slices:
             dense[tile] = True
             count = begun
     return count
+
+
+@njit(cache=True, nogil=True)
+def _copy(values, out):
+    """Copy a row to the beginning of another."""
+    for i in range(values.size):
+        out[i] = values[i]
 
 
 @njit(cache=True, nogil=True)
@@ -202,7 +211,7 @@ def _advance(pairs, nodes, right):
             values[((right + 2) & (HELD - 1)) * NODES :],
         )
         if (right & 7) == 0:
-            pairs[s, :COLUMN] = pairs[s, 8 * COLUMN :]
+            _copy(pairs[s, 8 * COLUMN :], pairs[s])
 
 
 @njit(cache=True, nogil=True)

@@ -230,7 +230,7 @@ def look_into(cells, n, nodes, bounds, largest, tolerance, rooms):
         for k in range(2):
             lacks = bounds[own, (3 + k) * n_slices + s, v] + rounding * largest[s]
             slack[k, lane] = slack_of(tolerance, lacks)
-    _expand_slices(cells, 0, nodes, single, at_nodes, half, samples[1])
+    _expand_slices(cells, np.int64(0), nodes, single, at_nodes, half, samples[1])
     _compare(samples[1], slack, hit[0, 0])
     kept = 0
     for lane in range(n):

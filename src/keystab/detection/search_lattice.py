@@ -29,15 +29,15 @@ from numpy.typing import NDArray
 
 from keystab.detection.search_bounds import SplineBounds, off_at_nodes
 from keystab.detection.search_cells import search_cells
+from keystab.detection.search_field import Field, field_of
 from keystab.detection.search_functionals import expansion
 from keystab.detection.search_hulls import CELLS, MARGIN, NODES
 from keystab.detection.search_kept import Kept
-from keystab.detection.search_nodes import LocalAxis, kinked_rows, local_axis, spline_nodes
+from keystab.detection.search_nodes import LocalAxis, kinked_rows, spline_nodes
 from keystab.detection.search_records import BLOCK, GROUP, TILE, Band, Kinked
 from keystab.detection.search_samples import search_samples
 from keystab.detection.search_sums import rows_of_nodes
 from keystab.scalespace.dog import ScaleSpace
-from keystab.scalespace.spline_axis import SplineAxis
 
 # Samples from one node to the next, where they lie one standard deviation of the finest slice
 # apart, and the power with which they become fewer: measured. Extrema among coarser samples differ
@@ -70,7 +70,7 @@ LARGEST = 1e30
 
 
 def applies(space: ScaleSpace) -> bool:
-    """Whether a scale-space of splines can be searched so."""
+    """Whether a scale-space can be searched so."""
     return space.largest <= LARGEST and space.shape[0] > 2
 
 
@@ -104,17 +104,9 @@ class LatticeSearch:
         Samples from one node to the next; by default as many as leave little over in a part in the
         middle. Noise makes bounds large, the more so the coarser the octave: they know how the
         image varies, and not that blur averages it.
+    field : Field, optional
+        What is searched, where it has been made.
     """
-
-    @staticmethod
-    def applies(space: ScaleSpace) -> bool:
-        """See `applies`."""
-        return applies(space)
-
-    @staticmethod
-    def shares_of_memory(n_blurs: int) -> tuple[float, float]:
-        """What its rows and its strips take of those for all samples."""
-        return 1 / 3, 1 / 3
 
     def __init__(
         self,
@@ -123,8 +115,10 @@ class LatticeSearch:
         window: tuple[slice, slice],
         threads: int = 1,
         p: int | None = None,
+        field: Field | None = None,
     ) -> None:
         self.space, self.tolerance = space, tolerance
+        self.field = field or field_of(space, p or node_distance(space))
         self._set_up(p or node_distance(space), window, threads)
         self._tried: dict[tuple[int, int, int], Found] = {}
         while p is None and self.p > 1 and self.parts:
@@ -158,29 +152,21 @@ class LatticeSearch:
             for top in range(0, n_cells[0], CELLS)
             for left in range(0, n_cells[1], wide)
         ]
-        blurs, lower, _ = space.blurs
-        _, n_rows, n_columns = space.shape
-        each = tuple(blurs.tolist())
-        whole_y, whole_x = space.axes
-        assert isinstance(whole_y, SplineAxis) and isinstance(whole_x, SplineAxis)
-        y_axis, x_axis = (
-            local_axis(axis, each, space.sampling.delta_min) for axis in (whole_y, whole_x)
-        )
-        self.y_axis = y_axis
+        field, n_samples = self.field, (space.shape[1], space.shape[2])
+        y_axis, x_axis = field.axes
         self.across = _nodes(
             x_axis, p, first[1] - MARGIN, -(-(n_cells[1] + 2 * MARGIN) // GROUP) + 1, np.float32
         )
-        self.off = float(off_at_nodes(space, (y_axis, x_axis)).max())
+        self.off = off_at_nodes(field)
         if p > 1:
-            small = blurs[lower] < _KINKED * p * space.sampling.step
-            n_kinked = min(int(np.cumprod(small).sum()), lower.size - 2)
-            self.kinked = _kinked(
-                (y_axis, x_axis), tuple(lower[:n_kinked].tolist()), (n_rows, n_columns)
-            )
+            small = field.blurs[field.lower] < _KINKED * p * field.step
+            n_kinked = min(int(np.cumprod(small).sum()), field.lower.size - 2)
+            lower = tuple(field.lower[:n_kinked].tolist())
+            self.kinked = _kinked(field.axes, lower, n_samples)
             many = tuple(
                 begin + -(-n // CELLS) * CELLS for begin, n in zip(first, n_cells, strict=True)
             )
-            self.bounds = SplineBounds(space, (y_axis, x_axis), p, (many[0], many[1]), n_kinked)
+            self.bounds = SplineBounds(field, p, (many[0], many[1]), n_kinked)
 
     def candidates(self, part: tuple[int, int, int]) -> Found:
         """Samples of a part that may be extrema, and rows and columns to be evaluated.
@@ -194,29 +180,29 @@ class LatticeSearch:
         """
         if part in self._tried:
             return self._tried.pop(part)
-        space, p = self.space, self.p
-        blurs, lower, upper = space.blurs
+        field, p = self.field, self.p
+        lower, upper = field.lower, field.upper
         top, left, n_cells = part
-        along = _nodes(self.y_axis, p, self.first[0] + top - MARGIN, NODES // GROUP, np.float64)
+        along = _nodes(field.axes[0], p, self.first[0] + top - MARGIN, NODES // GROUP, np.float64)
         begin = left // GROUP
         across = self.across.part(begin, begin + -(-(n_cells + 2 * MARGIN) // GROUP))
         # Only what the nodes see of the source.
         y0, y1 = along.first.min(), (along.first + along.width).max()
         x0, x1 = across.first.min(), (across.first + across.width).max()
-        source = space.source[y0:y1, x0:x1]
+        source = field.source[y0:y1, x0:x1]
         # Differences of Gaussians do not see a level: without it, less is rounded.
         level = float(source.min() + source.max()) / 2
         amplitude = float(source.max() - level)
-        blurred = np.empty((blurs.size, source.shape[1], NODES), dtype=np.float32)
+        blurred = np.empty((field.blurs.size, source.shape[1], NODES), dtype=np.float32)
         rows_of_nodes(along._replace(first=along.first - y0), source - level, blurred)
         across = across._replace(first=across.first - x0)
         n_tiles = -(-n_cells // TILE)
         dense = np.zeros(n_tiles, dtype=np.bool_)
         found = np.empty((1024 * n_tiles, 3), dtype=np.int64)
         row, column = p * (self.first[0] + top), p * (self.first[1] + left)
-        band = Band(p, row, column, n_cells, *space.shape[1:])
+        band = Band(p, row, column, n_cells, *field.shape[1:])
         if p == 1:
-            off = 2 * amplitude * self.off + 4 * space.rounding_bounds.value
+            off = amplitude * self.off + field.missed + field.rounding
             count = search_samples(
                 across, blurred, lower, upper, band, off, self.tolerance, found, dense
             )
@@ -236,7 +222,7 @@ class LatticeSearch:
                     self.tolerance,
                 ),
                 self.tolerance,
-                self.kinked._replace(source=space.source, level=level),
+                self.kinked._replace(source=field.source, level=level),
                 found,
                 dense,
             )
@@ -256,7 +242,8 @@ class LatticeSearch:
             slice(max(part.start, 1), min(part.stop, n - 1))
             for part, n in zip((rows, columns), self.space.shape[1:], strict=True)
         ]
-        return LatticeSearch(self.space, self.tolerance, (inner[0], inner[1]), p=1)
+        window = inner[0], inner[1]
+        return LatticeSearch(self.space, self.tolerance, window, p=1, field=self.field)
 
 
 def _runs(dense: NDArray[np.bool_], between: int) -> list[tuple[int, int]]:

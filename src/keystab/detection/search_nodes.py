@@ -14,9 +14,9 @@ from keystab.scalespace.spline_axis import (
     MirroredSplines,
     SplineAxis,
     SplineRows,
-    _no_tables,
     columns_of,
     fill_rows,
+    no_tables,
 )
 
 # A Gaussian ends at this many standard deviations, where 2e-8 is left of it; kernels are kept so
@@ -29,7 +29,7 @@ class LocalAxis:
     """A spline axis whose kernels end where their Gaussians do.
 
     Where the band limit of the grid shows, kernels ring beyond their Gaussians, and rows hardly do:
-    splines hold next to nothing of that frequency.
+    splines hold next to nothing of that frequency. Lengths are in distances of knots.
 
     Attributes
     ----------
@@ -41,12 +41,27 @@ class LocalAxis:
         Samples of the first octave's grid from one sample to the next.
     lacking : ndarray, shape (n_blurs,)
         Largest sum of absolute differences of a row from that of the axis.
+    first : int
+        Number of the first sample that counts; those before it are there for its neighbours.
+    before : int
+        Columns of the source before the knot at that sample.
+    mirrors : (float, float) or None
+        Where samples are mirrored, from the first one on; None where the source goes on instead.
     """
 
     rows: SplineRows
     n_columns: int
     stride: int
     lacking: NDArray[np.float64]
+    first: int
+    before: int
+    mirrors: tuple[float, float] | None
+
+    @property
+    def ends(self) -> tuple[int, int]:
+        """First and last sample that have rows."""
+        margin = 0 if self.mirrors else self.rows.taps.shape[1] // 2
+        return margin, self.rows.n_samples - 1 - margin
 
 
 @lru_cache(maxsize=8)
@@ -62,7 +77,7 @@ def local_axis(axis: SplineAxis, blurs: tuple[float, ...], delta: float) -> Loca
     column, weight, stop = rows.splines
     part = slice(margin - widest, column.size - margin + widest)
     splines = MirroredSplines(column[part], weight[part], stop[part] - part.start)
-    table, first, value = _no_tables(reach.size)
+    table, first, value = no_tables(reach.size)
     cut = SplineRows(rows.n_samples, taps, reach, splines, table, first, value)
     ring = (rows.reach > 9 * np.array(blurs) / delta + 1) | (rows.table >= 0)
     # Of a Gaussian that is cut, all rows lack at most what is cut.
@@ -70,7 +85,8 @@ def local_axis(axis: SplineAxis, blurs: tuple[float, ...], delta: float) -> Loca
     lacking = (np.abs(rows.taps) * outside).sum(axis=1)
     for blur in np.flatnonzero(ring):
         lacking[blur] = _largest_difference(rows, cut, blur, axis.stride, axis.n_columns)
-    return LocalAxis(cut, axis.n_columns, axis.stride, lacking)
+    mirrors = (-delta / 2, (rows.n_samples - 0.5) * delta)
+    return LocalAxis(cut, axis.n_columns, axis.stride, lacking, 0, 2, mirrors)
 
 
 @njit(cache=True, nogil=True)
@@ -102,12 +118,15 @@ def _largest_difference(rows, cut, blur, stride, n_columns):
 def spline_nodes(axis: LocalAxis, p: int, begin: int, n_groups: int, dtype: type) -> NodeRows:
     """Rows of every p-th sample of an axis, from node `begin` on.
 
-    Nodes beyond the ends stand for their mirror images. Entries are of the type given.
+    Nodes beyond mirrors stand for their images. Entries are of the type given.
     """
     rows, m = axis.rows, axis.rows.n_samples
-    node = p * axis.stride * np.arange(begin, begin + GROUP * n_groups)
-    node = np.where(node < 0, -1 - node, node)
-    node = np.clip(np.where(node >= m, 2 * m - 1 - node, node), 0, m - 1)
+    node = axis.first + p * axis.stride * np.arange(begin, begin + GROUP * n_groups)
+    if axis.mirrors:
+        node = np.where(node < 0, -1 - node, node)
+        node = np.where(node >= m, 2 * m - 1 - node, node)
+    low, high = axis.ends
+    node = np.clip(node, low, high)
     n_blurs = rows.reach.size
     first, width, offset = (np.zeros((n_blurs, n_groups), dtype=np.int64) for _ in range(3))
     _layout(rows, node, first, width)
@@ -125,12 +144,15 @@ def spline_nodes(axis: LocalAxis, p: int, begin: int, n_groups: int, dtype: type
 def _layout(rows, node, first, width):
     for blur in range(first.shape[0]):
         for g in range(first.shape[1]):
-            low, high = node[4 * g : 4 * g + 4].min(), node[4 * g : 4 * g + 4].max()
+            low = high = node[4 * g]
+            for k in range(4 * g, 4 * g + 4):
+                low, high = min(low, node[k]), max(high, node[k])
             first[blur, g], width[blur, g] = columns_of(rows, blur, low, high)
 
 
 @njit(cache=True, nogil=True)
 def _fill(rows, node, room, first, width, offset, entries):
+    one = np.int64(1)  # a constant would make another version of `fill_rows`
     for blur in range(first.shape[0]):
         for g in range(first.shape[1]):
             begin, left = offset[blur, g], first[blur, g]
@@ -143,7 +165,7 @@ def _fill(rows, node, room, first, width, offset, entries):
                         entries[begin + 4 * (start - left + k) + r] = room[r, k]
                 continue
             for r in range(4):
-                start, n = fill_rows(rows, blur, at[r], 1, room[:1])
+                start, n = fill_rows(rows, blur, at[r], one, room[:1])
                 for k in range(n):
                     entries[begin + 4 * (start - left + k) + r] = room[0, k]
 
@@ -166,7 +188,7 @@ def _rows_of_all(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """First column and row of m samples, and columns, for some blurs."""
     first = np.zeros((blurs.size, -(-m // GROUP)), dtype=np.int64)
-    begin = axis.stride * GROUP * np.arange(first.shape[1])
+    begin = axis.first + axis.stride * GROUP * np.arange(first.shape[1])
     wide = np.zeros_like(first)
     _spans(axis.rows, blurs, begin, (GROUP - 1) * axis.stride, first, wide)
     width = wide.max(axis=1, initial=0)

@@ -193,6 +193,8 @@ class _Tails:
 
 def spline_ends(axis: LocalAxis, delta: float, p: int, mixes: Mixes, n_blocks: int) -> Ends:
     """What functionals make of the mirror images at the ends of a spline axis."""
+    if not axis.mirrors:
+        return Ends(*[np.zeros((2, mixes.plus.size, n_blocks))] * 4)
     parts, m, between = functionals(p), axis.rows.n_samples, p * axis.stride
     start = between * np.arange(BLOCK * n_blocks)
     ends = np.concatenate([start + 0.5, m - 0.5 - start - between]).reshape(2, n_blocks, BLOCK)

@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from keystab.detection.search_nodes import LocalAxis
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -47,10 +49,27 @@ class Places(NamedTuple):
         )
         return cls(order % n, np.searchsorted(places[order], edges), np.maximum(from_end, 0))
 
+    @classmethod
+    def without_mirrors(
+        cls, n: int, first: int, block: float, n_blocks: int, margin: int
+    ) -> Places:
+        """Places of n entries at first, first + 1, ..."""
+        edges = block * np.arange(-margin, n_blocks + margin + 1)
+        begin = np.searchsorted(first + np.arange(n), edges)
+        return cls(np.arange(n), begin, np.full(n_blocks, n + n_blocks))
+
     def part(self, first: int, n: int, margin: int) -> tuple[Indices, Indices]:
         """Entries of n blocks and a margin on both sides, and where the blocks begin among them."""
         begin = self.begin[first : first + n + 2 * margin + 1]
         return self.entry[begin[0] : begin[-1]], begin - begin[0]
+
+
+def places_of(axis: LocalAxis, block: float, n_blocks: int, margin: int) -> Places:
+    """Places of the fourth differences of an axis, from the knot at its first sample on."""
+    n, first = axis.n_columns - 4, 2 - axis.before
+    if axis.mirrors:
+        return Places.of(n, block, axis.mirrors, n_blocks, margin)
+    return Places.without_mirrors(n, first, block, n_blocks, margin)
 
 
 @njit(cache=True, nogil=True, fastmath={"nnan", "nsz", "contract", "reassoc"})
@@ -85,10 +104,12 @@ def _dilate(values, other, step):
     """Raise every value to those that are a step away along both axes; `other` is work space."""
     high, wide = values.shape
     for v in range(high):
-        other[v] = values[v]
+        for u in range(wide):
+            other[v, u] = values[v, u]
         _raise_to(values[max(v - step, 0)], values[min(v + step, high - 1)], other[v])
     for v in range(high):
-        values[v] = other[v]
+        for u in range(wide):
+            values[v, u] = other[v, u]
         # What the ends lack does not matter: they are a margin away from all that is asked.
         _raise_to(other[v, : wide - 2 * step], other[v, 2 * step :], values[v, step : wide - step])
 
@@ -176,10 +197,13 @@ def largest_fourth(source: Array) -> float:
 
 
 def at_ends(
-    source: Array, mirrors: tuple[float, float], places: Places, steps: Indices, margin: int
+    source: Array, mirrors: tuple[float, float] | None, places: Places, steps: Indices, margin: int
 ) -> Array:
     """Largest |a_1| and |a_3| at the ends of axis 0, per block along the other one."""
     sizes = np.zeros((2, source.shape[1]))
+    many = places.from_end.size
+    if not mirrors:
+        return np.zeros((2, many))
     for mirror in mirrors:
         knot = int(np.floor(mirror))
         t = mirror - knot
@@ -187,7 +211,6 @@ def at_ends(
         first = np.array([-((1 - t) ** 2), 3 * t**2 - 4 * t, 1 + 2 * t - 3 * t**2, t**2]) / 2
         third = np.array([-1.0, 3.0, -3.0, 1.0]) / 6
         np.maximum(sizes, np.abs(np.stack([first, third]) @ four), out=sizes)
-    many = places.from_end.size
     index, begin = places.part(0, many, margin)
     largest = _largest(sizes[:, 2:-2][:, index], begin, 1, sizes.max())
     for step in steps:

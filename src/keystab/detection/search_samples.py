@@ -8,7 +8,7 @@ from numba import njit
 from keystab.detection.search_expansion import slack_of
 from keystab.detection.search_hulls import CELLS, FAST, MARGIN, NODES
 from keystab.detection.search_records import GROUP, HELD, SINGLE_ROUNDING, TILE
-from keystab.detection.search_sums import four_columns, subtract
+from keystab.detection.search_sums import four_columns, largest_of, subtract
 
 # Candidates from which all samples of a tile are evaluated.
 _MOST_CANDIDATES = 1024
@@ -18,7 +18,7 @@ _MOST_CANDIDATES = 1024
 def search_samples(rows, blurred, lower, upper, band, off, tolerance, found, dense):  # noqa: PLR0913
     """As `search_cells` where every sample is a node, and samples are compared as they are.
 
-    `off` is how far a difference of two samples may be off, but for single precision.
+    `off` is how far samples of each slice may be off, but for single precision.
     """
     n_slices, n_cells = lower.size, band.n_cells
     gaussians = np.empty((blurred.shape[0], GROUP, NODES), dtype=np.float32)
@@ -56,10 +56,10 @@ def search_samples(rows, blurred, lower, upper, band, off, tolerance, found, den
             left = ((x + MARGIN - 1) & (HELD - 1)) * NODES + MARGIN
             right = ((x + MARGIN + 1) & (HELD - 1)) * NODES + MARGIN
             for s in range(1, n_slices - 1):
-                own = 2 * SINGLE_ROUNDING * sizes[s].max()
+                own = 2 * SINGLE_ROUNDING * largest_of(sizes[s])
                 for k in range(3):
-                    other = 2 * SINGLE_ROUNDING * sizes[s - 1 + k].max()
-                    least[k] = slack_of(tolerance, off + own + other)
+                    other = 2 * SINGLE_ROUNDING * largest_of(sizes[s - 1 + k])
+                    least[k] = slack_of(tolerance, off[s] + off[s - 1 + k] + own + other)
                 finer, here, coarser = nodes[s - 1], nodes[s], nodes[s + 1]
                 _stand_out(
                     finer[at:],

@@ -99,6 +99,15 @@ def rows_of_nodes(rows, source, out):
                     out[blur, x, GROUP * g + k] = four[k, x]
 
 
+@njit(cache=True, nogil=True)
+def largest_of(values):
+    """Largest of some numbers; `max` of an array compiles all that it might be asked for."""
+    largest = values[0]
+    for value in values:
+        largest = max(largest, value)
+    return largest
+
+
 @njit(cache=True, nogil=True, fastmath=FAST)
 def subtract(high, low, out, room):
     """Write differences of `GROUP` columns of two Gaussians; return the largest size."""

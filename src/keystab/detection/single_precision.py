@@ -19,7 +19,6 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-import threadpoolctl
 from numba import njit
 from numpy.typing import NDArray
 
@@ -28,6 +27,7 @@ from keystab.errors import InputError
 from keystab.scalespace.dog import ScaleSpace, ranges
 from keystab.scalespace.spline_axis import spline_rows
 from keystab.utils import validation
+from keystab.utils.one_thread import one_thread
 
 # Samples a side of the blocks that are searched: all Gaussians of one are held at once.
 _BLOCK = 256
@@ -67,7 +67,7 @@ def single_precision_window(
     _, lower, upper = space.blurs
     # Sums of an image are off by more than those without its mean, which every Gaussian keeps.
     whole = ((space.source + space.image.mean()) * grey_range).astype(np.float32) if sums else None
-    with threadpoolctl.threadpool_limits(1):
+    with one_thread():
         along, across = (
             axis.block(*part) for axis, part in zip(space.axes, (rows, columns), strict=True)
         )

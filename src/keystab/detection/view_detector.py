@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from keystab.detection.detector import extrema_table, without_seams
 from keystab.detection.extrema import extrema_and_cubes, within
-from keystab.detection.refinement import positions, trace
+from keystab.detection.refinement import columns_of, positions, trace
 from keystab.scalespace.dog import ScaleSpace, scale_space
 
 Window = tuple[float, float, float, float]
@@ -119,7 +119,9 @@ def detect_in_view(
         octaves.append(
             table.assign(octave=octave, scale=table["step_sigma"], step=space.sampling.step)
         )
-    keep = without_seams(octaves, detector.n_spo, detector.sigma_min)
+    keep = without_seams(
+        [columns_of(table) for table in octaves], detector.n_spo, detector.sigma_min
+    )
     kept, followed, first = [], [], 0
     for table, models, mask in zip(octaves, traces, keep, strict=True):
         number = first + np.cumsum(mask) - 1

@@ -198,8 +198,10 @@ def basis(
     k = np.arange(n if count is None else count, dtype=np.float64)
     # The angle is reduced to one period before it is multiplied by pi. The reduction is exact, so
     # that at whole and half samples even the highest frequency keeps all its digits.
-    turns = np.fmod(np.multiply.outer(np.asarray(positions, dtype=np.float64) + 0.5, k), 2.0 * n)
-    angles = (np.pi / n) * turns
+    angles = np.multiply.outer(np.asarray(positions, dtype=np.float64) + 0.5, k)
+    periods = angles * (0.5 / n)
+    angles -= 2.0 * n * np.trunc(periods, out=periods)
+    angles *= np.pi / n
     if derivative == 0:
         return np.cos(angles)
     wave = (np.cos, np.sin)[derivative % 2](angles)

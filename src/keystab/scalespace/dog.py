@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-import threadpoolctl
 from numba import njit
 
 from keystab.errors import InputError
@@ -23,7 +22,9 @@ from keystab.scalespace.interpolants import Interpolant, interpolant
 from keystab.scalespace.rounding import Rounding
 from keystab.scalespace.sampling import Sampling, balanced_delta
 from keystab.utils import memory
+from keystab.utils.compiled_loops import tell_of_compilation
 from keystab.utils.masks import unmasked
+from keystab.utils.one_thread import one_thread
 
 # A tile of the store; searching for extrema uses flatter blocks (see `keystab.detection.extrema`).
 TILE = 128
@@ -136,7 +137,7 @@ class ScaleSpace:
         )
         box = np.empty((s1 - s0, y1 - y0, x1 - x0))
         tile_rows = list(ranges(y0, y1, TILE))
-        with threadpoolctl.threadpool_limits(1):
+        with one_thread():
             along = [self.axes[0].block(*part) for part in tile_rows]
             for left, right in ranges(x0, x1, TILE):
                 blocks = self.blocks(along, (left, right), (s0, s1))
@@ -216,7 +217,9 @@ class ScaleSpace:
             for column in range(self.n_tiles[1]):
                 yield row, column, self.tile(row, column)
 
-    def neighbourhoods(self, s: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    def neighbourhoods(
+        self, s: np.ndarray, row: np.ndarray, column: np.ndarray, tolerance: float = -1.0
+    ) -> np.ndarray:
         """Cubes of 3 x 3 x 3 samples around given samples.
 
         Each cube is evaluated by itself, so that its digits depend on the image and the sampling
@@ -226,6 +229,9 @@ class ScaleSpace:
         ----------
         s, row, column : ndarray of int, shape (n,)
             Indices of the centres, at least one sample away from every end.
+        tolerance : float
+            From 0 on, cubes whose centre does not differ by more from all others, one way, may
+            lack slices: these are NaN.
 
         Returns
         -------
@@ -234,7 +240,9 @@ class ScaleSpace:
         """
         indices = [np.ascontiguousarray(i, dtype=np.int64) for i in (s, row, column)]
         _, lower, upper = self.blurs
-        return self.interpolant.neighbourhoods(self.source, self.axes, lower, upper, *indices)
+        return self.interpolant.neighbourhoods(
+            self.source, self.axes, lower, upper, *indices, tolerance=tolerance
+        )
 
     @cached_property
     def largest(self) -> float:
@@ -329,6 +337,7 @@ def scale_space(
     """
     interpolant(oversampling)
     array = checked_image(image)
+    tell_of_compilation()
     if delta_min is None:
         delta_min = balanced_delta(n_spo, kappa, sigma_min)
     sampling = Sampling(

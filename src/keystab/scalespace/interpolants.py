@@ -40,6 +40,7 @@ class Interpolant(Protocol):
         lower: np.ndarray,
         upper: np.ndarray,
         *centres: np.ndarray,
+        tolerance: float,
     ) -> np.ndarray:
         """Cubes of 3 x 3 x 3 samples around samples, shape (n, 3, 3, 3)."""
 
@@ -77,6 +78,7 @@ class SplineInterpolant:
         lower: np.ndarray,
         upper: np.ndarray,
         *centres: np.ndarray,
+        tolerance: float,  # noqa: ARG002 - a cube takes less than to look at its parts
     ) -> np.ndarray:
         """Sums over the few coefficients in reach."""
         return spline_neighbourhoods(source, axes, lower, upper, *centres)
@@ -121,9 +123,10 @@ class CosineInterpolant:
         lower: np.ndarray,
         upper: np.ndarray,
         *centres: np.ndarray,
+        tolerance: float,
     ) -> np.ndarray:
         """Sums over all coefficients that the Gaussians leave."""
-        return cosine_neighbourhoods(source, axes, lower, upper, *centres)
+        return cosine_neighbourhoods(source, axes, lower, upper, *centres, tolerance=tolerance)
 
     def rounding(
         self,

@@ -8,12 +8,12 @@ scale-space was cut up.
 from __future__ import annotations
 
 import numpy as np
-import threadpoolctl
 from numba import njit
 
 from keystab.scalespace.axis import AxisOperator
 from keystab.scalespace.cosine_axis import CosineAxis
 from keystab.scalespace.spline_axis import SplineAxis, fill_rows
+from keystab.utils.one_thread import one_thread
 
 # Candidates handled at once in cosine mode: bounds the memory of their cosines.
 _BATCH = 256
@@ -31,7 +31,7 @@ def spline_neighbourhoods(
     """Cubes around samples of a spline scale-space, shape (n, 3, 3, 3)."""
     y_axis, x_axis = axes
     assert isinstance(y_axis, SplineAxis) and isinstance(x_axis, SplineAxis)
-    cubes = np.zeros((s.size, 3, 3, 3))
+    cubes = np.empty((s.size, 3, 3, 3))
     _spline_cubes(
         source,
         y_axis.rows,
@@ -55,6 +55,8 @@ def cosine_neighbourhoods(
     s: np.ndarray,
     row: np.ndarray,
     column: np.ndarray,
+    *,
+    tolerance: float,
 ) -> np.ndarray:
     """Cubes around samples of a cosine scale-space, shape (n, 3, 3, 3)."""
     y_axis, x_axis = axes
@@ -62,7 +64,7 @@ def cosine_neighbourhoods(
     cubes = np.zeros((s.size, 3, 3, 3))
     around = np.arange(-1, 2)
     # One thread: digits must not depend on the cores, and the products are too small to share.
-    with threadpoolctl.threadpool_limits(1):
+    with one_thread():
         for start in range(0, s.size, _BATCH):
             part = slice(start, start + _BATCH)
             _cosine_cubes(
@@ -74,6 +76,7 @@ def cosine_neighbourhoods(
                 lower,
                 upper,
                 s[part],
+                tolerance,
                 cubes[part],
             )
     return cubes
@@ -84,52 +87,119 @@ def _spline_cubes(source, y_axis, x_axis, stride, lower, upper, s, row, column, 
     y_rows = np.empty((3, source.shape[0]))
     x_rows = np.empty((3, source.shape[1]))
     lines = np.empty((3, source.shape[1]))
+    blurs, values = np.empty(6, dtype=np.int64), np.empty((6, 3, 3))
     for k in range(s.size):
         top, left = (row[k] - 1) * stride, (column[k] - 1) * stride
         for a in range(3):
-            for pair in range(2):
-                blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
-                y_first, height = fill_rows(y_axis, blur, top, stride, y_rows)
-                x_first, width = fill_rows(x_axis, blur, left, stride, x_rows)
-                _add_products(
-                    source[y_first : y_first + height, x_first : x_first + width],
-                    y_rows[:, :height],
-                    x_rows[:, :width],
-                    lines,
-                    1.0 if pair == 0 else -1.0,
-                    cubes[k, a],
-                )
+            blurs[2 * a], blurs[2 * a + 1] = lower[s[k] - 1 + a], upper[s[k] - 1 + a]
+        for n in range(6):
+            blur, known = blurs[n], 0  # the upper Gaussian of a slice may be the lower of another
+            while blurs[known] != blur:
+                known += 1
+            if known < n:
+                for b in range(3):
+                    for c in range(3):
+                        values[n, b, c] = values[known, b, c]
+                continue
+            y_first, height = fill_rows(y_axis, blur, top, stride, y_rows)
+            x_first, width = fill_rows(x_axis, blur, left, stride, x_rows)
+            _set_products(
+                source[y_first : y_first + height, x_first : x_first + width],
+                y_rows[:, :height],
+                x_rows[:, :width],
+                lines,
+                values[n],
+            )
+        for a in range(3):
+            for b in range(3):
+                for c in range(3):
+                    cubes[k, a, b, c] = values[2 * a + 1, b, c] - values[2 * a, b, c]
 
 
 @njit(cache=True, nogil=True)
-def _cosine_cubes(source, y_basis, x_basis, y_gains, x_gains, lower, upper, s, cubes):  # noqa: PLR0913
+def _cosine_cubes(  # noqa: PLR0913
+    source, y_basis, x_basis, y_gains, x_gains, lower, upper, s, tolerance, cubes
+):
+    """Write cubes, the slice in the middle first; of those of no extremum, perhaps no more."""
     n_y, n_x = source.shape
-    # Rows of all six Gaussians of a cube: upper and lower of three slices, three rows each.
-    rows = np.empty((18, n_y))
+    rows, lines = np.empty((n_y, 6)), np.empty((6, n_x))
     for k in range(s.size):
-        for a in range(3):
+        cubes[k] = np.nan
+        for a in (1, 0, 2):
+            blurs = upper[s[k] - 1 + a], lower[s[k] - 1 + a]
             for pair in range(2):
-                blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
+                gain = y_gains[blurs[pair]]
                 for b in range(3):
                     for i in range(n_y):
-                        rows[6 * a + 3 * pair + b, i] = y_basis[k, b, i] * y_gains[blur, i]
-        lines = np.dot(rows, source)
-        for a in range(3):
-            for pair in range(2):
-                blur = upper[s[k] - 1 + a] if pair == 0 else lower[s[k] - 1 + a]
-                for b in range(3):
-                    for j in range(n_x):
-                        lines[6 * a + 3 * pair + b, j] *= x_gains[blur, j]
-        values = np.dot(lines, x_basis[k].T)
-        for a in range(3):
+                        rows[i, 3 * pair + b] = y_basis[k, b, i] * gain[i]
+            _six_products(rows, source, lines)
             for b in range(3):
-                for e in range(3):
-                    cubes[k, a, b, e] = values[6 * a + b, e] - values[6 * a + 3 + b, e]
+                for c in range(3):
+                    total = 0.0
+                    for pair in range(2):
+                        gain, line, wave = x_gains[blurs[pair]], lines[3 * pair + b], x_basis[k, c]
+                        total = _sum_of_three(line, gain, wave) - total
+                    cubes[k, a, b, c] = -total
+            if not _may_exceed(cubes[k, a], cubes[k, 1, 1, 1], a == 1, tolerance):
+                break
+
+
+@njit(cache=True, nogil=True)
+def _may_exceed(values, middle, own, tolerance):
+    """Whether a sample differs from those of a slice by more than the tolerance, all one way."""
+    above, below = True, True
+    for b in range(3):
+        for c in range(3):
+            if own and b == 1 and c == 1:
+                continue
+            above &= middle - values[b, c] > tolerance
+            below &= middle - values[b, c] < -tolerance
+    return above or below or tolerance < 0
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def _sum_of_three(one, other, third):
+    total = 0.0
+    for j in range(one.size):
+        total += one[j] * other[j] * third[j]
+    return total
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _add_products(source, y_rows, x_rows, lines, sign, out):
-    """Add ``sign * y_rows @ source @ x_rows.T`` (3 x 3) to `out`, in a fixed order of sums.
+def _six_products(rows, source, lines):
+    """Write the product of six rows, side by side, and the source, in a fixed order of sums."""
+    n_y, n = source.shape
+    l0, l1, l2, l3, l4, l5 = lines[0], lines[1], lines[2], lines[3], lines[4], lines[5]
+    for j in range(n):
+        l0[j] = l1[j] = l2[j] = l3[j] = l4[j] = l5[j] = 0.0
+    i = 0
+    while i + 4 <= n_y:
+        s, t, u, v = source[i], source[i + 1], source[i + 2], source[i + 3]
+        a, b, c, d = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
+        a0, a1, a2, a3, a4, a5 = a[0], a[1], a[2], a[3], a[4], a[5]
+        b0, b1, b2, b3, b4, b5 = b[0], b[1], b[2], b[3], b[4], b[5]
+        c0, c1, c2, c3, c4, c5 = c[0], c[1], c[2], c[3], c[4], c[5]
+        d0, d1, d2, d3, d4, d5 = d[0], d[1], d[2], d[3], d[4], d[5]
+        for j in range(n):
+            x, y, z, w = s[j], t[j], u[j], v[j]
+            l0[j] = l0[j] + a0 * x + b0 * y + c0 * z + d0 * w
+            l1[j] = l1[j] + a1 * x + b1 * y + c1 * z + d1 * w
+            l2[j] = l2[j] + a2 * x + b2 * y + c2 * z + d2 * w
+            l3[j] = l3[j] + a3 * x + b3 * y + c3 * z + d3 * w
+            l4[j] = l4[j] + a4 * x + b4 * y + c4 * z + d4 * w
+            l5[j] = l5[j] + a5 * x + b5 * y + c5 * z + d5 * w
+        i += 4
+    while i < n_y:
+        for r in range(6):
+            weight = rows[i, r]
+            for j in range(n):
+                lines[r, j] += weight * source[i, j]
+        i += 1
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _set_products(source, y_rows, x_rows, lines, out):
+    """Write ``y_rows @ source @ x_rows.T`` (3 x 3), in a fixed order of sums.
 
     `lines` is work space, shape (3, n) with at least as many columns as the source.
     """
@@ -165,12 +235,12 @@ def _add_products(source, y_rows, x_rows, lines, sign, out):
         a0, a1, a2 = a0 + a * x, a1 + a * y, a2 + a * z
         b0, b1, b2 = b0 + b * x, b1 + b * y, b2 + b * z
         c0, c1, c2 = c0 + c * x, c1 + c * y, c2 + c * z
-    out[0, 0] += sign * a0
-    out[0, 1] += sign * a1
-    out[0, 2] += sign * a2
-    out[1, 0] += sign * b0
-    out[1, 1] += sign * b1
-    out[1, 2] += sign * b2
-    out[2, 0] += sign * c0
-    out[2, 1] += sign * c1
-    out[2, 2] += sign * c2
+    out[0, 0] = a0
+    out[0, 1] = a1
+    out[0, 2] = a2
+    out[1, 0] = b0
+    out[1, 1] = b1
+    out[1, 2] = b2
+    out[2, 0] = c0
+    out[2, 1] = c1
+    out[2, 2] = c2

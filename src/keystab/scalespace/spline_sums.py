@@ -13,7 +13,8 @@ def blurred_spline_rows(start, stride, taps, reach, splines, first, out):
     # Zeros around the taps: of four rows, the outer ones do not reach all samples.
     margin = 3 * stride
     tap = np.zeros(2 * (reach + margin) + 1)
-    tap[margin : margin + 2 * reach + 1] = taps[middle - reach : middle + reach + 1]
+    for k in range(2 * reach + 1):
+        tap[margin + k] = taps[middle - reach + k]
     for row in range(0, out.shape[0], 4):
         n_rows = min(4, out.shape[0] - row)
         sample = start + row * stride - reach + middle

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import threadpoolctl
 from numpy.typing import NDArray
 
 from keystab.detection.extrema import discrete_extrema, extrema_of_array
@@ -16,6 +15,7 @@ from keystab.errors import InputError
 from keystab.scalespace.continuous_dog import BELOW_BLUR, MOST_AMPLIFIED, ContinuousDog, Jets
 from keystab.scalespace.dog import ScaleSpace, ranges, scale_space
 from keystab.utils import validation
+from keystab.utils.one_thread import one_thread
 
 __all__ = [
     "NO_SEEDS",
@@ -109,7 +109,7 @@ def seeds_of_first_slice(space: ScaleSpace, threads: int = 1) -> Seeds:
 
     space.source, space.axes  # noqa: B018  made once, before threads share them
     bands = list(ranges(1, space.shape[1] - 1, 256))
-    with threadpoolctl.threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
+    with one_thread(), ThreadPoolExecutor(threads) as pool:
         parts = list(pool.map(extremal, bands))
     _, row, column, sign = np.concatenate([np.empty((0, 4), dtype=np.int64), *parts]).T
     sigma = np.full(sign.size, space.sigma[0])

@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 PACKAGE_FOLDER = Path(__file__).parents[1]
@@ -60,6 +62,26 @@ def forget_outdated(package_folder: Path = PACKAGE_FOLDER) -> bool:
     except OSError:  # only readable: numba keeps nothing here either
         return False
     return True
+
+
+@cache
+def tell_of_compilation() -> None:
+    """Say on standard error, once, that loops of this package are compiled, if none were kept."""
+    from numba.core import event
+
+    class Teller(event.Listener):
+        told = False
+
+        def on_start(self, event: event.Event) -> None:
+            module = event.data["dispatcher"].py_func.__module__
+            if not self.told and module.startswith("keystab."):
+                self.told = True
+                print("keystab compiles its loops, which takes some seconds once", file=sys.stderr)
+
+        def on_end(self, event: event.Event) -> None:
+            pass
+
+    event.register("numba:compile", Teller())  # type: ignore[no-untyped-call]
 
 
 def _modules(folder: str | os.PathLike[str], within: str) -> Iterator[str]:
