@@ -60,3 +60,9 @@ class Kept(Generic[Result]):
                 _, oldest = self._results.popitem(last=False)
                 self._total -= self._n_bytes(oldest)
         return result
+
+    def cache_clear(self) -> None:
+        """Forget all, as `functools.lru_cache` does."""
+        with self._lock:
+            self._results.clear()
+            self._total = 0
