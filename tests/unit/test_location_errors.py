@@ -215,6 +215,7 @@ def test_no_seam_is_measured_where_there_is_none():
         (0.5, "yx", 2**0.5, "0.5 yx radius"),
         (1.0, "xy", 8**0.5, "1 xy blob diameter"),
         (0.0, "yx", 4.0, "0 yx 4 sigma"),
+        (0.0, "xy", 6.0, "0 xy 6 sigma"),  # kornia
         (0.12, "yx", 1.2, "(0.12, 0.12) yx 1.2 sigma"),
     ],
 )

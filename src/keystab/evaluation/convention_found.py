@@ -87,7 +87,7 @@ def found_convention(
     -------
     FoundConvention
         Each blob takes the nearest detection within `NEAR` pixels whose scale is between half and
-        four times its sigma. Of the two orders that counts in which more blobs are found.
+        eight times its sigma. Of the two orders that counts in which more blobs are found.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def _offsets(detections: pd.DataFrame, blobs: pd.DataFrame) -> NDArray[np.float6
         for (y, x, sigma), candidates in zip(
             blobs[["y", "x", "sigma"]].to_numpy(), near, strict=True
         ):
-            own = [k for k in candidates if 0.5 * sigma <= scale[k] <= 4 * sigma]
+            own = [k for k in candidates if 0.5 * sigma <= scale[k] <= 8 * sigma]
             if own:
                 place = found[own] - [y, x]
                 k = int(np.argmin((place**2).sum(axis=1)))
