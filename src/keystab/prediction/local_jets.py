@@ -1,13 +1,14 @@
-r"""The Taylor expansion of the difference of Gaussians at scattered points, to the third order.
+r"""The Taylor expansion of the difference of Gaussians at scattered points, to the fourth order.
 
 The cubic spline through the pixels (`keystab.scalespace.spline_axis`) blurred by a continuous
 Gaussian of variance b is a sum of pixels' worth of coefficients times
 
 .. math:: (\beta^3 * G_b)(t) = \sum_{j=0}^{4} (-1)^j \binom 4j F(t + 2 - j),
 
-where F is the fourth antiderivative of :math:`G_b`; derivatives of order four and more are
-differences of derivatives of :math:`G_b` itself. So a jet is a sum over a window of some blurs,
-whatever the size of the picture, and is exact for the spline but for where the window ends.
+where F is the fourth antiderivative of :math:`G_b`; derivatives of order four to eight (a fourth
+derivative along scale is one) are differences of derivatives of :math:`G_b` itself. So a jet is a
+sum over a window of some blurs, whatever the size of the picture, and is exact for the spline but
+for where the window ends.
 """
 
 from __future__ import annotations
@@ -18,16 +19,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from keystab.prediction.noise_covariance import HEAT, ORDERS
+from keystab.prediction.noise_covariance import HEAT, ORDER, ORDERS
 from keystab.scalespace.spline_axis import spline_source
 
 __all__ = ["local_image", "local_jets"]
 
-#: Half of the window in blurs. Sixth derivatives, the highest, are cut at 1e-5 of their size.
+#: Orders of the derivatives in space: each one along scale is two of them.
+_COUNT = 2 * ORDER + 1
+
+#: Half of the window in blurs. Eighth derivatives, the highest, are cut at 1e-7 of their size.
 _REACH = 7.0
 
-#: Least added blur in pixels: below it the third derivatives of a cubic spline are those of steps.
-_LEAST_BLUR = 0.05
+#: Least added blur in pixels: with less, the eighth derivatives of a cubic spline, spikes at its
+#: knots, are larger than those of white noise in the band of the pixel grid.
+_LEAST_BLUR = 0.2
 
 #: Mirrored coefficients that `spline_source` puts around those of the pixels.
 _PADDING = 2
@@ -54,10 +59,10 @@ def local_jets(
 
     Returns
     -------
-    ndarray, shape (n, 20)
+    ndarray, shape (n, 35)
         Derivatives in the scale-space's own units, ordered as
         `keystab.prediction.noise_covariance.ORDERS`: value, gradient (scale, y, x), Hessian (ss,
-        sy, sx, yy, yx, xx) and third derivatives.
+        sy, sx, yy, yx, xx), third and fourth derivatives.
 
     Examples
     --------
@@ -103,7 +108,7 @@ def _coefficients(image: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @njit(cache=True, nogil=True)
 def _values(source, sigma, y, x, camera_blur, out):
-    products = np.empty((7, 7))
+    products = np.empty((_COUNT, _COUNT))
     for point in range(sigma.size):
         _derivatives(source, sigma[point] ** 2 - camera_blur**2, y[point], x[point], products)
         out[point] = products[0, 0]
@@ -111,7 +116,7 @@ def _values(source, sigma, y, x, camera_blur, out):
 
 @njit(cache=True, nogil=True)
 def _jets(source, sigma, y, x, camera_blur, kappa, orders, heat, out):  # noqa: PLR0913
-    products = np.empty((7, 7))
+    products = np.empty((_COUNT, _COUNT))
     for point in range(sigma.size):
         for i in range(2):
             q = (kappa * sigma[point]) ** 2 if i == 0 else sigma[point] ** 2
@@ -132,22 +137,22 @@ def _jets(source, sigma, y, x, camera_blur, kappa, orders, heat, out):  # noqa: 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def _derivatives(source, variance, y, x, products):
-    """Derivatives of order m along y and k along x, m + k <= 6, of a blurred spline."""
+    """Derivatives of order m along y and k along x, m + k <= 8, of a blurred spline."""
     height, width = source.shape
     blur = math.sqrt(max(variance, _LEAST_BLUR**2))
     top, rows = _axis(y, blur)
     left, columns = _axis(x, blur)
     products[:] = 0.0
-    lines = np.empty(7)
+    lines = np.empty(_COUNT)
     for a in range(rows.shape[0]):
         row = source[_mirrored(top + a, height)]
         lines[:] = 0.0
         for b in range(columns.shape[0]):
             value = row[_mirrored(left + b, width)]
-            for k in range(7):
+            for k in range(_COUNT):
                 lines[k] += value * columns[b, k]
-        for m in range(7):
-            for k in range(7 - m):
+        for m in range(_COUNT):
+            for k in range(_COUNT - m):
                 products[m, k] += rows[a, m] * lines[k]
 
 
@@ -160,17 +165,17 @@ def _mirrored(index, size):
 
 @njit(cache=True, nogil=True)
 def _axis(position, blur):
-    """First pixel of a window, and weights of its pixels for derivatives of order 0 to 6."""
+    """First pixel of a window, and weights of its pixels for derivatives of order 0 to 8."""
     reach = _REACH * blur + 2.0
     first = math.ceil(position - reach)
     count = math.floor(position + reach) - first + 1
-    knots = np.empty((count + 4, 7))
+    knots = np.empty((count + 4, _COUNT))
     for a in range(count + 4):
         _antiderivatives(position - (first + a) + 2.0, blur, knots[a])
     # Derivatives of beta^3 * G are fourth differences of those of F.
-    weights = np.empty((count, 7))
+    weights = np.empty((count, _COUNT))
     for a in range(count):
-        for k in range(7):
+        for k in range(_COUNT):
             weights[a, k] = (
                 knots[a, k]
                 - 4.0 * knots[a + 1, k]
@@ -183,7 +188,7 @@ def _axis(position, blur):
 
 @njit(cache=True, nogil=True)
 def _antiderivatives(t, blur, out):
-    """Derivatives of order 0 to 6 of the fourth antiderivative of a Gaussian."""
+    """Derivatives of order 0 to 8 of the fourth antiderivative of a Gaussian."""
     b2 = blur * blur
     gauss = math.exp(-0.5 * t * t / b2) / (blur * math.sqrt(2.0 * math.pi))
     # The tail of the distribution keeps its digits on either side.
@@ -194,8 +199,8 @@ def _antiderivatives(t, blur, out):
     out[2] = t * step * side + b2 * gauss
     out[3] = step * side
     out[4] = gauss
-    out[5] = -t / b2 * gauss
-    out[6] = (t * t / b2 - 1.0) / b2 * gauss
+    for k in range(4, _COUNT - 1):
+        out[k + 1] = -(t * out[k] + (k - 4.0) * out[k - 1]) / b2
     if t >= 0:
         out[3] += 1.0
         out[2] += t

@@ -1,14 +1,16 @@
 r"""Covariances of the derivatives of a difference of Gaussians, of noise and of natural scenes.
 
-A *jet* is a function's Taylor expansion at a point: here the 20 derivatives of w up to the third
-order with respect to :math:`(\ln\sigma, y/\sigma, x/\sigma)`, in the order of `ORDERS`. Derivatives
-with respect to :math:`\lambda = \ln\sigma` are spatial ones by the heat equation: with
-:math:`q = \kappa_i^2\sigma^2` of either Gaussian and v the image that it has blurred,
+A *jet* is a function's Taylor expansion at a point: here the 35 derivatives of w up to the order
+`ORDER`, the fourth, with respect to :math:`(\ln\sigma, y/\sigma, x/\sigma)`, in the order of
+`ORDERS`. Derivatives with respect to :math:`\lambda = \ln\sigma` are spatial ones by the heat
+equation: with :math:`q = \kappa_i^2\sigma^2` of either Gaussian and v the image that it has
+blurred,
 
 .. math:: \partial_\lambda v = q \Delta v, \qquad
           \partial_\lambda^2 v = 2 q \Delta v + q^2 \Delta^2 v, \qquad
-          \partial_\lambda^3 v = 4 q \Delta v + 6 q^2 \Delta^2 v + q^3 \Delta^3 v .
+          \partial_\lambda^3 v = 4 q \Delta v + 6 q^2 \Delta^2 v + q^3 \Delta^3 v ,
 
+and so on: :math:`\partial_\lambda q^k \Delta^k v = 2 k q^k \Delta^k v + q^{k+1} \Delta^{k+1} v`.
 So the covariance of two derivatives is a sum of moments of a power spectrum. That of white noise
 fills the band of the pixel grid, :math:`|\omega| \le \pi` on both axes; its moments separate into
 
@@ -29,23 +31,33 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import erf
 
-__all__ = ["ORDERS", "band_moments", "noise_jets", "scene_jets"]
+__all__ = ["HEAT", "ORDER", "ORDERS", "band_moments", "noise_jets", "scene_jets"]
+
+ORDER = 4
+"""Highest order of a derivative of a jet.
+
+Within the distance at which an extremum counts as the same, the third is too low: see
+`keystab.prediction.survival`.
+"""
 
 ORDERS = np.array(
     [
         (n, p, degree - n - p)
-        for degree in range(4)
+        for degree in range(ORDER + 1)
         for n in range(degree, -1, -1)
         for p in range(degree - n, -1, -1)
     ]
 )
-"""Orders of the derivatives of a jet along ln sigma, y and x, by total order, shape (20, 3)."""
+"""Orders of the derivatives of a jet along ln sigma, y and x, by total order, shape (35, 3)."""
 
-HEAT = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 2, 1, 0], [0, 4, 6, 1]], dtype=np.float64)
+HEAT = np.array(
+    [[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 2, 1, 0, 0], [0, 4, 6, 1, 0], [0, 8, 28, 12, 1]],
+    dtype=np.float64,
+)
 """Weight of (q Laplacian)^k, column k, in a derivative along ln sigma of the order of the row."""
 
-#: Highest moment that third derivatives along scale need.
-_HIGHEST = 6
+#: Highest moment that two derivatives of the highest order along scale need.
+_HIGHEST = 2 * ORDER
 
 _NODES, _WEIGHTS = (
     np.asarray(part, dtype=np.float64) for part in np.polynomial.legendre.leggauss(32)
@@ -107,7 +119,7 @@ def noise_jets(sigma: NDArray[np.float64], camera_blur: float, kappa: float) -> 
 
     Returns
     -------
-    ndarray, shape (n, 20, 20)
+    ndarray, shape (n, 35, 35)
         In the scale-space's own units at each scale, rows and columns as in `ORDERS`.
 
     Examples
@@ -126,7 +138,9 @@ def noise_jets(sigma: NDArray[np.float64], camera_blur: float, kappa: float) -> 
     return covariance
 
 
-_BINOMIAL = np.array([[math.comb(n, k) for k in range(7)] for n in range(7)], dtype=np.float64)
+_BINOMIAL = np.array(
+    [[math.comb(n, k) for k in range(_HIGHEST + 1)] for n in range(_HIGHEST + 1)], dtype=np.float64
+)
 
 
 @njit(cache=True, nogil=True)
@@ -162,8 +176,8 @@ def _noise_jets(sigma, kappa, moments, orders, heat, binomial, out):
 def _pair(first, second, heat_first, heat_second, p, q, moments, binomial):
     """Covariance of derivatives of two blurred images, of even orders 2p and 2q in total."""
     total = 0.0
-    for k in range(4):
-        for m in range(4):
+    for k in range(heat_first.size):
+        for m in range(heat_second.size):
             weight = heat_first[k] * heat_second[m]
             if weight != 0.0:
                 laplacian = 0.0
@@ -183,7 +197,7 @@ def scene_jets(kappa: float) -> NDArray[np.float64]:
 
     Returns
     -------
-    ndarray, shape (20, 20)
+    ndarray, shape (35, 35)
         The same at all scales and blurs of the camera, because neither enters in the scale-space's
         own units.
 
@@ -201,7 +215,7 @@ def scene_jets(kappa: float) -> NDArray[np.float64]:
         total = 0.0
         for first, second in product((kappa**2, 1.0), repeat=2):
             sign = 1.0 if first == second else -1.0
-            for i, j in np.ndindex(4, 4):
+            for i, j in np.ndindex(ORDER + 1, ORDER + 1):
                 weight = sign * HEAT[n, i] * HEAT[m, j] * (-first) ** i * (-second) ** j
                 for a in range(i + j + 1):
                     moment = _scale_free(
