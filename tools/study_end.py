@@ -55,9 +55,10 @@ def ending(settings: Mapping[str, Any], folder: Path = Path()) -> str:
     except (OSError, ValueError):
         return ""
     counts = Counter(claim["verdict"] for claim in claims)
-    head = "Verdicts of a draft, on" if settings["draft"] else "Verdicts on"
+    head = "Verdicts of a draft, on" if settings.get("draft") else "Verdicts on"
+    picture = settings.get("reference", "no picture")  # a study of theory has none
     said = ", ".join(f"{counts[name]} {name}" for name in VERDICTS if counts[name])
-    lines = ["", f"{head} {settings['reference']}: {said}."]
+    lines = ["", f"{head} {picture}: {said}."]
     lines += [
         f"  {claim['id']}: {claim['statement']} ({claim['verdict']})" for claim in clearest(claims)
     ]
