@@ -57,7 +57,7 @@ SPREAD = Allowed(absolute=1e-9)
 CONDITION = Allowed(relative=1e-7)
 """Condition numbers of single Hessians, up to 1e5, whose largest entry is right to 1e-12."""
 
-WEIGHED = Allowed(relative=1e-6)
+WEIGHED = Allowed(relative=4e-7)
 """Medians of solutions of iterated, robust least squares, stopped at changes of 1e-8."""
 
 LEARNT = Allowed(absolute=1e-6)
@@ -123,6 +123,16 @@ COLUMNS: tuple[tuple[str, str, Allowed], ...] = (
     ("predictors_detections", "y x sigma keypoint_y keypoint_x", PLACE),
     ("predictors_detections", "eigenvalue edge degeneracy saddle annulus end persistence", SPREAD),
     ("predictors_detections", "(stability|inside|truth)_.*", LEARNT),
+    ("floor_(readings|summary)", "n_unique", COUNTED),
+    ("dead_range", "end", SET),
+    ("dead_range", "(share|low|high)_below", COUNTED),
+    ("large_scales_octaves", "space_tolerance", SET),
+    ("unbalanced_interpolation", "condition", CONDITION),
+    ("unbalanced_interpolation", "(share|low|high)_accepted", COUNTED),
+    ("unbalanced_interpolation", "(low_|high_)?spread spread_scale (low|high)_scale", SPREAD),
+    ("blur_zooms_pairs", "distance scale_shift q25_shift q75_shift", SPREAD),
+    ("figS3_ranges", "confusion defocus f_smallest f_largest", SET),
+    ("figS3_ranges", "smallest largest", SOLVED),
     ("aliasing_energy", "contrast dog aliased.*", SOLVED),
     ("reference_noise", "noise_.*", SOLVED),
     ("reference_noise", "distance scale_shift q25_shift q75_shift", SPREAD),
