@@ -15,13 +15,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from keystab.camera.view_sets import view_shapes
 from keystab.errors import InputError
 from keystab.io.pictures import picture_shape
 from keystab.study import settings
 from keystab.study.corpus import CorpusScene, places, read_corpus
+from keystab.study.plain_yaml import read_plain_yaml
 from keystab.study.scenes import by_place
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -64,8 +63,8 @@ def main(arguments: Sequence[str]) -> int:
     names = list(arguments[: arguments.index("--")] if "--" in arguments else arguments)
     further = list(arguments[arguments.index("--") + 1 :] if "--" in arguments else ())
     files = [word for word in further if word.endswith((".yaml", ".yml"))]
-    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
     try:
+        schema = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
         config = settings.checked(settings.read_yaml(ROOT / "config/config.yaml", *files), schema)
         corpus = read_corpus(ROOT / "config/scenes.csv")
         wanted = chosen(corpus, names)
