@@ -1,10 +1,16 @@
-"""Make the small pictures of the README, docs/figures/*.png, from the figures of the last run.
+"""Make the small pictures of the pages of findings, docs/figures/*.png, from those of the last run.
 
-python tools/gallery.py    after `make study`
+python tools/gallery.py             after `make study`
+python tools/gallery.py --overlay   that of the README, by its own commands
 """
 
 from __future__ import annotations
 
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 
 from PIL import Image
@@ -15,16 +21,35 @@ WIDTH = 1400
 
 
 def small(picture: Image.Image) -> Image.Image:
-    """Shrink a figure to the width of a page and to 256 colours, chosen so that none is far off."""
+    """Shrink a figure to the width of a page, in few colours."""
     height = round(picture.height * WIDTH / picture.width)
-    picture = picture.convert("RGB").resize((WIDTH, height), Image.Resampling.LANCZOS)
-    return picture.quantize(
+    return few_colours(picture.convert("RGB").resize((WIDTH, height), Image.Resampling.LANCZOS))
+
+
+def few_colours(picture: Image.Image) -> Image.Image:
+    """Reduce a figure to 256 colours, chosen so that none is far off."""
+    return picture.convert("RGB").quantize(
         256, method=Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE
     )
 
 
-def main() -> int:
-    """Write one small picture per figure."""
+def overlay(out: Path) -> None:
+    """Draw what the first two commands of the README do: keypoints with error bars."""
+    lines = re.findall(r"^keystab (.+)$", (ROOT / "README.md").read_text(), re.MULTILINE)
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "config").symlink_to(ROOT / "config")
+        for line in lines[:2]:
+            command = [sys.executable, "-m", "keystab.cli", *shlex.split(line)]
+            subprocess.run(command, cwd=folder, check=True)
+        with Image.open(Path(folder) / "bars.png") as picture:
+            few_colours(picture).save(out, optimize=True)
+
+
+def main(argv: list[str]) -> int:
+    """Write one small picture per figure, or that of the README."""
+    if "--overlay" in argv:
+        overlay(ROOT / "docs/figures/overlay.png")
+        return 0
     for figure in sorted((ROOT / "figures").glob("*.png")):
         out = ROOT / "docs/figures" / figure.name
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -35,4 +60,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(main(sys.argv[1:]))

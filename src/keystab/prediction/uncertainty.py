@@ -111,13 +111,8 @@ def keypoint_uncertainty(
     one picture (`keystab.prediction.detector_error`), is added to it, and `survival` is multiplied
     by the share of true extrema that the detector finds there.
 
-    Measured on views of four photographs that did not steer the model (``casamila``, ``otter``,
-    ``lanterns``, ``colosseum``; 288 x 160 pixels, blur 0.8, two octaves, 40 pairs of shots at each
-    noise): from one shot alone, its noise estimated, 90 % ellipses of the difference of two shots
-    hold 0.911, 0.893, 0.889 at noise of 0.003, 0.01, 0.03 (0.88 to 0.92 on each photograph), 95 %
-    ellipses 0.954, 0.945, 0.946, 90 % intervals of the scale 0.912, 0.903, 0.902; the survival is
-    off by 0.007, 0.009, 0.017 on average over bins of a tenth, at most by 0.047 on one photograph,
-    ``lanterns``, where more keypoints return than is said (by 0.089 in one bin).
+    ``docs/uncertainty.md`` says what they were held against, on four photographs that did not steer
+    the model, and where they fail.
 
     What follows was measured with derivatives up to the third order; the fourth changes what
     ellipses and intervals hold by at most 0.007. With the noise given, they hold the same within
