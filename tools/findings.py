@@ -21,6 +21,7 @@ import json
 import math
 import re
 import sys
+import textwrap
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
@@ -39,6 +40,8 @@ TEMPLATES = ROOT / "docs/findings/templates"
 REFERENCE = ROOT / "results/reference"
 ELSEWHERE = {"README.md": "README.md", "uncertainty.md": "docs/uncertainty.md"}
 """Templates of pages that do not lie in docs/findings."""
+WIDTH = 110
+"""Characters of a line."""
 
 WORDS = {
     "reproduced": "holds",
@@ -151,7 +154,11 @@ def ledger(*figures: str) -> str:
 
 
 def _numbers(one: dict[str, Any]) -> Iterator[str]:
+    """Numbers that the criterion names."""
+    deciding = set(re.findall(r"\w+", one["criterion"]))
     for name, value in one["value"].items():
+        if name not in deciding:
+            continue
         low_high = one["interval"].get(name)
         yield f"{name} {float(value):.4g}" + (
             " ({:.4g} to {:.4g})".format(*low_high) if low_high else ""
@@ -273,6 +280,34 @@ def environment() -> jinja2.Environment:
     return made
 
 
+def filled(text: str) -> str:
+    r"""Prose in lines of a page's width; tables, headings, pictures and code stay as they are.
+
+    Examples
+    --------
+    >>> filled("- a\n  word\n- b\n\n| c\n|\n")
+    '- a word\n- b\n\n| c\n|\n'
+    """
+    pieces = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
+    for k in range(0, len(pieces), 2):  # between fences
+        pieces[k] = re.sub(r"(?:^(?![|#!<]|\[!).+\n)+", _fill, pieces[k], flags=re.MULTILINE)
+    return "".join(pieces)
+
+
+def _fill(found: re.Match[str]) -> str:
+    items = re.split(r"\n(?=- |\d\. )", found[0].rstrip("\n"))
+    lines = []
+    for item in items:
+        mark = re.match(r"- |\d\. |", item)
+        indent = " " * len(mark[0]) if mark else ""
+        # What would be a list or a lone sign at the start of a line stays with the word before it.
+        words = re.sub(r" (?=%|\d+\. |[-+*=>] )", "\0", " ".join(item.split()))
+        lines += textwrap.wrap(
+            words, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+        )
+    return "\n".join(lines).replace("\0", " ") + "\n"
+
+
 def written(name: str) -> str:
     """The page that a template makes."""
     note = f"<!-- Written by tools/findings.py from {(TEMPLATES / name).relative_to(ROOT)} -->\n\n"
@@ -286,7 +321,7 @@ def written(name: str) -> str:
         ]
         line = getattr(problem, "lineno", None) or (lines[-1] if lines else "?")
         raise InputError(f"{name}, line {line}: {problem}") from None
-    return note + re.sub(r"\n{3,}", "\n\n", text)
+    return note + filled(re.sub(r"\n{3,}", "\n\n", text))
 
 
 def pages() -> dict[str, Path]:
