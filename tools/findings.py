@@ -217,6 +217,11 @@ def pooled(place: str, weight: str, **where: Any) -> float:
     return float(np.average(column(place, **where), weights=weights))
 
 
+def apart(one: list[float], other: list[float]) -> float:
+    """Largest difference of numbers that belong together."""
+    return max(abs(a - b) for a, b in zip(one, other, strict=True))
+
+
 def percent(value: float, digits: int = 0, sign: str = " %") -> str:
     """A share in percent.
 
@@ -273,7 +278,8 @@ def environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     functions: list[Callable[..., Any]] = [
-        claim, verdict, statement, chosen, ledger, figure, cell, column, pooled, scenes, pictures,
+        claim, verdict, statement, chosen, ledger, figure, cell, column, pooled, apart, scenes,
+        pictures,
     ]  # fmt: skip
     made.globals.update({one.__name__: one for one in functions}, inf=math.inf, words=WORDS)
     made.filters.update(percent=percent, fixed=fixed, digits=digits, interval=interval)
