@@ -34,7 +34,8 @@ LATER = {
     for name in (
         "deviations", "glossary", "how_it_works/error_bars", "how_it_works/index",
         "how_it_works/matching", "how_it_works/series", "how_it_works/truth", "reference/api",
-        "reproduce/costs", "reproduce/index", "start/first_results", "start/own_picture",
+        "reproduce/costs", "reproduce/index", "start/first_results", "start/install",
+        "start/own_picture",
     )
 }  # fmt: skip
 """Pages that are written elsewhere at this moment; links to them are allowed until they are there."""

@@ -19,11 +19,9 @@ From each of a fixed set of quasi-random draws of z and :math:`J_2`, the extremu
 with these derivatives is climbed to. The share of draws whose extremum lies within `RADIUS` is the
 survival, and their second moments are the covariance of the shift.
 
-The polynomial is a quartic: up to `RADIUS` terms of the fourth order matter. Of views without noise
-whose keypoints have a survival of 0.3 to 0.9 (``street``, ``coldwarm``, ``otter`` at noise of
-0.03), climbing on w itself, given the noise, agrees with the detector in 97 to 99 % of the cases,
-on the quartic in 92 to 94 % and on a cubic in 88 to 89 %. Either misses somewhat more extrema than
-it invents.
+The polynomial is a quartic: up to `RADIUS` terms of the fourth order matter. Quartic and cubic miss
+somewhat more extrema than they invent. ``docs/uncertainty.md`` says how often each agrees with the
+detector, and has the numbers of what is left out below.
 
 A detector looks at the 26 neighbours of a sample, so that it takes a saddle for an extremum where
 all of these lie on its steep sides: along a ridge askew to the grid. Therefore a stationary point
@@ -31,15 +29,13 @@ counts as an extremum where the curvature has the sign along the 13 directions o
 along all.
 
 Two things are left out, and seen. *Where the grid lies*: a saddle tops its neighbours at some
-places of the grid only, so that at little noise fewer return than is said (at 0.003, from the view
-without noise: 0.37 to 0.60 for 0.48 to 0.81 on four photographs). With a grid that has a sample at
-the keypoint more return than is said (by 0.25 where little is, on ``coldwarm``): so none is
-assumed. *What kind of scene it is*: the spectrum's exponent of 2 and its being the same in all
-directions. Seen through noise, Gaussian fields of exponent 3 return more than a cubic said (0.77
-for 0.74, noise an eighth of their amplitude), and made strokes less (0.54 for 0.58 at noise of
-0.03). With the right exponent half of the former error is gone; the exponent under which the jets
-of ``street`` are likeliest, some 3, makes its error larger (0.077 for 0.068), because its edges
-have one direction: so none is inferred.
+places of the grid only, so that at little noise fewer return than is said. With a grid that has a
+sample at the keypoint more return than is said (by 0.25 where little is, on ``coldwarm``): so none
+is assumed. *What kind of scene it is*: the spectrum's exponent of 2 and its being the same in all
+directions. Seen through noise an eighth of their amplitude, Gaussian fields of exponent 3 return
+more than a cubic said, and made strokes less. With the right exponent half of the former error is
+gone; the exponent under which the jets of ``street`` are likeliest, some 3, makes its error larger
+(0.077 for 0.068), because its edges have one direction: so none is inferred.
 """
 
 from __future__ import annotations
