@@ -108,7 +108,8 @@ def claim(place: str, picture: str = "") -> Number:
     name, _, quantity = place.partition(".")
     known(name, claims(), "claim")
     if picture:
-        said = str(pictures()[name][f"{picture}_value"])
+        row = pictures()[name]
+        said = str(row[known(f"{picture}_value", row, "column of three pictures")])
         values = {pair.split()[0]: float(pair.split()[1]) for pair in said.split("; ")}
         return number(values[known(quantity, values, f"number of {name}")])
     own = claims()[name]

@@ -64,6 +64,7 @@ def test_a_verdict_is_that_of_the_ledger(tool, monkeypatch):
     [
         ('{{ claim("no-such.new") }}', "line 1: no claim 'no-such'"),
         ('\n{{ claim("majority-stable.new") }}', "line 2: no number of majority-stable 'new'; there are stable"),
+        ('{{ claim("majority-stable.stable", "lake") }}', "no column of three pictures 'lake_value'"),
         ('{{ cell("fig99.n") }}', "no table 'fig99'"),
         ('{{ cell("fig4_counts.n") }}', "no column of fig4_counts 'n'"),
         ('{{ cell("fig4_counts.n_common") }}', "17 rows of fig4_counts.n_common have {}; name one"),
