@@ -1,0 +1,96 @@
+"""The pages on how it works: examples run, what they name exists, and hosts can show them."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "docs/how_it_works"
+PAGES = sorted(path.stem for path in FOLDER.glob("*.md"))
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
+FORMULA = re.compile(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", re.DOTALL)
+MOST_WORDS, MOST_BYTES, LEAST_WIDTH = 1500, 60_000, 1400
+
+
+def prose(page: str) -> str:
+    return FENCE.sub("", (FOLDER / f"{page}.md").read_text())
+
+
+def examples(page: str) -> list[tuple[str, str]]:
+    """Code, and what it prints: the block after it."""
+    blocks = FENCE.findall((FOLDER / f"{page}.md").read_text())
+    kinds = [kind for kind, _ in blocks]
+    assert kinds == ["python", ""] * (len(kinds) // 2)
+    return [(blocks[i][1], blocks[i + 1][1]) for i in range(0, len(blocks), 2)]
+
+
+def found(name: str) -> object:
+    """What a dotted name of the library stands for."""
+    parts = name.split(".")
+    for n in range(len(parts), 0, -1):
+        try:
+            thing: object = importlib.import_module(".".join(parts[:n]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[n:]:
+            thing = getattr(thing, part)
+        return thing
+    raise AssertionError(name)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != "index"])
+def test_examples_print_what_is_shown(page):
+    for code, shown in examples(page):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(code, {})
+        assert printed.getvalue() == shown
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_names_of_the_library_exist(page):
+    names = re.findall(r"`(keystab(?:\.\w+)+)`", prose(page))
+    assert names
+    for name in names:
+        assert found(name) is not None
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pages_are_short_and_their_formulas_survive_markdown(page):
+    text = prose(page)
+    assert len(text.split()) <= MOST_WORDS
+    formulas = [display or inline for display, inline in FORMULA.findall(text)]
+    assert FORMULA.sub("", text).count("$") == 0  # none is left open, or goes over a line
+    for formula in formulas:
+        assert formula.count("{") == formula.count("}"), formula
+        # Markdown takes a backslash before a sign for its own, and bars in tables for cells.
+        assert not re.search(r"\\[^a-zA-Z\s]", formula), formula
+        assert "|" not in formula and "*" not in formula, formula
+
+
+def test_pages_lead_to_each_other_and_to_their_figures(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    explain = importlib.import_module("explain")
+    shown = []
+    for page in PAGES:
+        for text, path in re.findall(r"\[([^]]*)\]\(([^):#]+)\)", prose(page)):
+            target = (FOLDER / path).resolve()
+            if target.parent == FOLDER or target.suffix == ".png":
+                assert target.exists(), path
+            if target.suffix == ".png":
+                assert len(text) > 40  # what one who cannot see it is told
+                shown.append(target)
+    assert sorted(shown) == sorted(explain.place(name) for name in explain.FIGURES)
+    for path in shown:
+        assert path.stat().st_size < MOST_BYTES, path
+        with Image.open(path) as picture:
+            assert picture.width >= LEAST_WIDTH
+    linked = set(re.findall(r"\]\((\w+)\.md\)", prose("index")))
+    assert linked == set(PAGES) - {"index"}
