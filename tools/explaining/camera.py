@@ -43,8 +43,8 @@ def _draw_row(ax: Axes) -> None:
     ax.plot((fine - FIRST) / STEP, sharp, color=palette.PALE, lw=0.8)
     ax.plot((fine - FIRST) / STEP, blurred, color=palette.METHOD_COLOURS["dct"], lw=1.2)
     ax.plot(np.arange(PIXELS), pixels, "o", color=palette.INK, ms=3.5, mec="none", zorder=3)
-    top = float(max(sharp.max(), 0.1))
-    ax.set(xlabel="position x (px of the view)", ylabel="grey value", ylim=(0, 1.4 * top))
+    ax.set(xlabel="position x (px of the view)", ylabel="grey value", ylim=(0, 1.35))
+    ax.set_yticks(np.arange(0, 1.1, 0.25))
     for x, text, colour in (
         (0.02, "scene", palette.GREY),
         (0.30, "blurred", palette.METHOD_COLOURS["dct"]),
@@ -62,8 +62,10 @@ def _draw_left(ax: Axes) -> None:
     for blur in BLURS:
         left = np.exp(-((2 * np.pi * frequency * blur) ** 2) / 2)
         ax.plot(frequency, left, color=colours[blur], lw=1.3)
-    for blur, x, y in zip(BLURS, (0.76, 0.545, 0.03, 0.03), (0.62, 0.33, 0.30, 0.12), strict=True):
-        ax.text(x, y, f"c = {blur:g}", color=colours[blur], fontsize=style.SMALL)
+    names = ("c = 0.25 px", "0.5", "0.8", "1.1")
+    for blur, name, x in zip(BLURS, names, (0.69, 0.42, 0.28, 0.06), strict=True):
+        y = 0.66 if blur == BLURS[0] else 0.45
+        ax.text(x, y, name, color=colours[blur], fontsize=style.SMALL)
     ax.text(0.76, 0.95, "folded back", color=palette.GREY, fontsize=style.SMALL, ha="center")
     ax.set(xlabel="frequency (cycles/px)", ylabel="share of contrast left", xlim=(0, 1))
     ax.set_ylim(0, 1.03)

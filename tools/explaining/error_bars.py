@@ -22,12 +22,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-BLUR, NOISE, N_SPO, SHOTS = 0.8, 0.02, 12, 60
+BLUR, NOISE, N_SPO, SHOTS = 0.8, 0.01, 12, 60
 TWO_NORMALS = 4.605
 """The 90 % quantile of the sum of two squared normal variables."""
 
-BLOB, WEAKER, BLOB_NOISE = 2.0, 0.7, 0.02
-DISTANCES = np.arange(4.6, 7.01, 0.2)
+BLOB, WEAKER = 2.0, 0.7
+DISTANCES = {5.8: "near a saddle", 7.0: "far from it"}
+"""Of two blobs, pixels: at 5.7 px the weaker one has no extremum of its own."""
+
+NOISES = np.geomspace(0.01, 0.32, 8)
 
 
 class Shots(NamedTuple):
@@ -58,10 +61,10 @@ def returns(keypoint: pd.Series[float], image: Array, noise: float, purpose: str
 @cache
 def shots() -> tuple[Shots, Shots]:
     """Two keypoints that are likely to survive: a round one, and the most elongated one."""
-    image = view(BLUR, 48, 72)
+    image = view(BLUR, 64, 96)
     found = keypoint_uncertainty(image, BLUR, NOISE, N_SPO, kappa=KAPPA, noise_free=True)
-    inside = found["y"].between(8, 39) & found["x"].between(8, 63)
-    found = found[inside & (found["survival"] > 0.9) & found["sigma"].between(1.4, 2.0)]
+    inside = found["y"].between(8, 55) & found["x"].between(8, 87)
+    found = found[inside & (found["survival"] > 0.95) & found["sigma"].between(1.4, 2.0)]
     covariance = np.array(
         [[found["std_y"] ** 2, found["cov_yx"]], [found["cov_yx"], found["std_x"] ** 2]]
     )
@@ -75,7 +78,7 @@ def shots() -> tuple[Shots, Shots]:
 
 @cache
 def survivals() -> pd.DataFrame:
-    """Survival of the weaker of two blobs, predicted and counted, by their distance."""
+    """Survival of the weaker of two blobs, predicted and counted, by distance and noise."""
     rows = []
     y, x = np.mgrid[:33, :49].astype(float)
     spread = 2 * (BLOB**2 + BLUR**2)
@@ -83,14 +86,13 @@ def survivals() -> pd.DataFrame:
         places = 24 - distance / 2, 24 + distance / 2
         strong, weak = (np.exp(-((y - 16) ** 2 + (x - place) ** 2) / spread) for place in places)
         image = strong + WEAKER * weak
-        found = keypoint_uncertainty(image, BLUR, BLOB_NOISE, N_SPO, kappa=KAPPA, noise_free=True)
-        near = found[(found["sign"] < 0) & ((found["y"] - 16).abs() < 1) & (found["x"] > 24.3)]
-        if not len(near):
-            continue
-        keypoint = near.loc[near["value"].idxmin()]
-        seen = len(returns(keypoint, image, BLOB_NOISE, "blobs"))
-        rows.append((distance, keypoint["survival"], seen / SHOTS))
-    return pd.DataFrame(rows, columns=["distance", "predicted", "counted"])
+        for noise in NOISES:
+            found = keypoint_uncertainty(image, BLUR, noise, N_SPO, kappa=KAPPA, noise_free=True)
+            near = found[(found["sign"] < 0) & ((found["y"] - 16).abs() < 1) & (found["x"] > 25)]
+            keypoint = near.loc[near["value"].idxmin()]
+            seen = len(returns(keypoint, image, noise, "blobs"))
+            rows.append((distance, noise, keypoint["survival"], seen / SHOTS))
+    return pd.DataFrame(rows, columns=["distance", "noise", "predicted", "counted"])
 
 
 def ellipse(keypoint: pd.Series[float]) -> Array:
@@ -113,8 +115,8 @@ def draw() -> Figure:
     left, right, survival = figure.subplots(1, 3, width_ratios=(1, 1, 1.3))
     for ax, shot in zip((left, right), shots(), strict=True):
         draw_shots(ax, shot)
-        ax.set(xlabel="x - x of the keypoint (px)")
-    left.set(ylabel="y - y of the keypoint (px)")
+        ax.set(xlabel="shift in x (px)")
+    left.set(ylabel="shift in y (px)")
     style.letter(left, "a", "shots, and 90 % ellipses")
     _draw_survival(survival)
     style.finish_axes(left, right, survival)
@@ -134,13 +136,13 @@ def draw_shots(ax: Axes, shot: Shots) -> None:
 
 
 def _draw_survival(ax: Axes) -> None:
-    table = survivals()
-    colour = palette.DETECTION_COLOURS["refined"]
-    ax.plot(table["distance"], table["predicted"], color=colour, lw=1.4)
-    ax.plot(table["distance"], table["counted"], "o", color=palette.GREY, ms=4, mec="none")
-    ax.set(xlabel="distance of the blobs (px)", ylabel="survival", ylim=(0, 1.04))
-    ax.text(0.97, 0.22, "predicted", color=colour, ha="right", fontsize=style.SMALL,
-            transform=ax.transAxes)  # fmt: skip
-    ax.text(0.97, 0.1, "share of shots", color=palette.GREY, ha="right", fontsize=style.SMALL,
-            transform=ax.transAxes)  # fmt: skip
-    style.letter(ax, "b", "a keypoint beside a saddle")
+    colours = palette.DETECTION_COLOURS["discrete"], palette.DETECTION_COLOURS["refined"]
+    for (distance, table), colour in zip(survivals().groupby("distance"), colours, strict=True):
+        ax.plot(table["noise"], table["predicted"], color=colour, lw=1.4)
+        ax.plot(table["noise"], table["counted"], "o", color=colour, ms=4, mec="none")
+        name = DISTANCES[float(str(distance))]
+        y = 0.1 if colour == colours[0] else 0.22
+        ax.text(0.03, y, name, color=colour, fontsize=style.SMALL, transform=ax.transAxes)
+    style.log_x_axis(ax, 0.01, 0.32)
+    ax.set(xlabel="noise (grey value)", ylabel="survival", ylim=(0, 1.04))
+    style.letter(ax, "b", "lines: predicted; dots: counted")

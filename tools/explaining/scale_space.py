@@ -38,16 +38,16 @@ def _draw_slices(ax: Axes) -> None:
     for octave, colour in enumerate(palette.OCTAVE_COLOURS):
         sampling = Sampling(SIZE, CAMERA_BLUR, 3, step, SIGMA_MIN, KAPPA, octave)
         for s, sigma in enumerate(sampling.sigma):
-            height = s + 5.9 * octave
+            height = s + 6.4 * octave
             searched = 1 <= s <= sampling.n_spo
             shade = colour if searched else palette.PALE
             ax.plot([sigma, KAPPA * sigma], [height] * 2, color=shade, lw=2.2, marker="o", ms=3.5)
             ticks.append(height)
             names.append(str(s))
         name = f"octave {octave + 1}: step {sampling.step:.2f} px"
-        ax.text(1.02, 5.05 + 5.9 * octave, name, color=colour, fontsize=style.SMALL, va="center")
+        ax.text(1.02, 5.1 + 6.4 * octave, name, color=colour, fontsize=style.SMALL, va="center")
     style.log_x_axis(ax, 1.0, 8.0)
-    ax.set(xlim=(1.0, 8.0), ylim=(-0.6, 11.6), xlabel="blur (px)", ylabel="slice s")
+    ax.set(xlim=(1.0, 8.0), ylim=(-0.6, 12.2), xlabel="blur (px)", ylabel="slice s")
     ax.set_yticks(ticks, names)
     style.letter(ax, "a", "two blurs for each slice")
 
@@ -60,7 +60,7 @@ def _draw_balance(ax: Axes) -> None:
     style.direct_label(
         ax, 3, 0.5, "SIFT", palette.SIFT_COLOURS["unfiltered"], right=7, up=4, ha="left"
     )
-    style.log_y_axis(ax, 0.05, 1.0)
+    style.log_y_axis(ax, 0.06, 0.95)
     ax.set(xlabel=f"{style.N_SPO} (scales per octave)", ylabel=f"{style.DELTA_MIN} (px)")
     ax.set_xticks([3, 5, 10, 15, 20])
     style.letter(ax, "b", "balanced step")
@@ -78,14 +78,12 @@ def _draw_blob(ax: Axes) -> None:
         count = math.floor(n_spo * math.log2(3.3 / SIGMA_MIN)) + 1
         scales = SIGMA_MIN * 2 ** (np.arange(count) / n_spo)
         ax.plot(scales, dog_at_centre(scales, BLOB, KAPPA), mark, color=colour, ms=size, mec="none")
-    ax.text(
-        found, -0.0948, r"$\sigma_{\mathrm{blob}}/\sqrt{\kappa}$", ha="center", fontsize=style.SMALL,
-        color=palette.GREY,
-    )  # fmt: skip
-    for x, n_spo, kind in ((2.35, 3, "discrete"), (2.35, 15, "refined")):
-        y = -0.0985 if n_spo == 3 else -0.1005
-        colour = palette.DETECTION_COLOURS[kind]
-        ax.text(x, y, f"{style.N_SPO} = {n_spo}", color=colour, fontsize=style.SMALL)
+    for y, text, colour in (
+        (-0.0825, r"$\sigma_{\mathrm{blob}}/\sqrt{\kappa}$", palette.GREY),
+        (-0.0905, f"{style.N_SPO} = 3", palette.DETECTION_COLOURS["discrete"]),
+        (-0.0935, f"{style.N_SPO} = 15", palette.DETECTION_COLOURS["refined"]),
+    ):
+        ax.text(1.03 * found, y, text, color=colour, fontsize=style.SMALL)
     style.log_x_axis(ax, 1.0, 3.4)
     ax.set(xlabel="scale σ (px)", ylabel="w (grey value)", xlim=(1.05, 3.4))
     style.letter(ax, "c", "a blob of 2 px")

@@ -68,7 +68,7 @@ def columns_of_bounds(bounds: Bounds, column: int) -> Array:
     """Bounds of one column of blocks of cells, as `keystab.detection.search_cells` adds them up."""
     along_y, along_x = bounds.along_y, bounds.along_x
     ends = sum(
-        along_x[k, column][None, :] * bounds.ends_y[:, k]
+        along_x[k, column] * bounds.ends_y[:, k]
         + bounds.ends_x[column, :, k][:, None] * along_y[k][None, :]
         for k in range(2)
     )
@@ -221,4 +221,4 @@ def _draw_cells(ax: Axes) -> None:
         handles=handles, ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False,
         handlelength=1, columnspacing=1, handletextpad=0.4,
     )  # fmt: skip
-    style.letter(ax, "b", "cells of one slice, by what excludes them; circles: extrema")
+    style.letter(ax, "b", "cells of a slice; circles: extrema")

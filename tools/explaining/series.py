@@ -51,7 +51,7 @@ def _draw_mirrors(ax: Axes) -> None:
     where = np.arange(-n, 2 * n)
     mirrored = np.pad(PIXELS, n, mode="symmetric")
     inside = (where >= 0) & (where < n)
-    fine = np.linspace(-n + 0.2, 2 * n - 1.2, 1200)
+    fine = np.linspace(-n, 2 * n - 1, 1200)
     ax.plot(fine, by_series(PIXELS, fine), color=palette.METHOD_COLOURS["dct"], lw=1.2)
     ax.plot(where[inside], mirrored[inside], "o", color=palette.INK, ms=4, mec="none")
     ax.plot(where[~inside], mirrored[~inside], "o", mfc="white", mec=palette.INK, ms=4, mew=0.8)

@@ -48,10 +48,10 @@ def distance(places: Array, true: Array) -> Array:
 @cache
 def climb() -> Climb:
     """The extremum of a small view whose discrete detection is farthest off, of those well shaped."""
-    image = view(BLUR, 64, 96)
+    image = view(BLUR, 112, 200)
     series = DogSeries.of_image(image, BLUR, KAPPA)
     truth = true_extrema(image, BLUR)
-    truth = truth[(truth["conditioning"] > 0.15) & truth["sigma"].between(1.5, 2.0)]
+    truth = truth[(truth["conditioning"] > 0.06) & truth["sigma"].between(1.4, 2.0)]
     found = {
         name: detect_keypoints(image, BLUR, n_spo, refine=refine)
         for name, n_spo, refine in (
@@ -98,8 +98,8 @@ def draw() -> Figure:
 def _draw_plane(ax: Axes) -> None:
     found = climb()
     delta = balanced_delta(N_SPO, KAPPA, 1.1)
-    x = np.linspace(found.true[2] - 1.3, found.true[2] + 1.3, 81)
-    sigma = np.geomspace(found.true[0] / 1.62, found.true[0] * 1.62, 81)
+    x = np.linspace(found.true[2] - 1.0, found.true[2] + 1.0, 81)
+    sigma = np.geomspace(found.true[0] / 1.4, found.true[0] * 1.4, 81)
     grid_sigma, grid_x = np.meshgrid(sigma, x, indexing="ij")
     y = np.full(grid_x.size, found.true[1])
     values = found.series.jets(grid_sigma.ravel(), y, grid_x.ravel()).value.reshape(grid_x.shape)
@@ -114,7 +114,20 @@ def _draw_plane(ax: Axes) -> None:
     ):  # fmt: skip
         colour = palette.DETECTION_COLOURS[kind]
         ax.plot(place[2], place[0], mark, color=colour, ms=6, mec="white", zorder=4)
-    ax.plot(found.true[2], found.true[0], "*", color=palette.INK, ms=10, mec="white", zorder=5)
+    ax.plot(found.true[2], found.true[0], "*", color=palette.INK, ms=8, mec="white", zorder=5)
+    handles = [
+        ax.plot([], [], mark, color=colour, ms=5, mec="none", label=name)[0]
+        for mark, colour, name in (
+            ("o", palette.GREY, "samples"),
+            ("s", palette.DETECTION_COLOURS["discrete"], "discrete extremum"),
+            ("D", palette.DETECTION_COLOURS["refined"], "refined"),
+            ("*", palette.INK, "true extremum"),
+        )
+    ]
+    ax.legend(
+        handles=handles, ncols=4, loc="lower center", bbox_to_anchor=(0.5, -0.32), frameon=False,
+        handletextpad=0.1, columnspacing=0.9,
+    )  # fmt: skip
     style.log_y_axis(ax, float(sigma[0]), float(sigma[-1]))
     ax.set(xlim=(x[0], x[-1]), xlabel="x (px)", ylabel="scale σ (px)")
     style.letter(ax, "a", "contours of w, and the samples")
@@ -132,11 +145,13 @@ def _draw_steps(ax: Axes) -> None:
         off = distance(place, found.true)[0]
         colour = palette.DETECTION_COLOURS["refined"]
         ax.axhline(off, color=colour, lw=1)
+        above = n_spo == N_SPO
         ax.text(
-            number[-1], 1.4 * off, f"refined, {style.N_SPO} = {n_spo}", color=colour, ha="right",
-            va="bottom", fontsize=style.SMALL,
+            number[-1] if above else 0, off * (1.5 if above else 0.6),
+            f"refined, {style.N_SPO} = {n_spo}", color=colour, ha="right" if above else "left",
+            va="bottom" if above else "top", fontsize=style.SMALL,
         )  # fmt: skip
-    style.log_y_axis(ax, 1e-13, 3.0)
+    style.log_y_axis(ax, 3e-16, 3.0)
     ax.text(0.15, 1.2 * away[0], "discrete", color=palette.DETECTION_COLOURS["discrete"],
             fontsize=style.SMALL, va="bottom")  # fmt: skip
     ax.set(xlabel="Newton's steps", ylabel="distance (scale-space units)", xticks=number)
