@@ -63,8 +63,8 @@ def _draw_left(ax: Axes) -> None:
         left = np.exp(-((2 * np.pi * frequency * blur) ** 2) / 2)
         ax.plot(frequency, left, color=colours[blur], lw=1.3)
     names = ("c = 0.25 px", "0.5", "0.8", "1.1")
-    for blur, name, x in zip(BLURS, names, (0.69, 0.42, 0.28, 0.06), strict=True):
-        y = 0.66 if blur == BLURS[0] else 0.45
+    places = ((0.66, 0.68), (0.53, 0.33), (0.28, 0.45), (0.06, 0.45))
+    for blur, name, (x, y) in zip(BLURS, names, places, strict=True):
         ax.text(x, y, name, color=colours[blur], fontsize=style.SMALL)
     ax.text(0.76, 0.95, "folded back", color=palette.GREY, fontsize=style.SMALL, ha="center")
     ax.set(xlabel="frequency (cycles/px)", ylabel="share of contrast left", xlim=(0, 1))

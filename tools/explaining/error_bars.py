@@ -54,7 +54,8 @@ def returns(keypoint: pd.Series[float], image: Array, noise: float, purpose: str
             + ((found["y"] - keypoint["y"]) ** 2 + (found["x"] - keypoint["x"]) ** 2) / sigma**2
         )
         if len(away) and away.min() < RADIUS:
-            places.append(found.loc[away.idxmin(), ["y", "x", "sigma"]].to_numpy(dtype=float))
+            nearest = int(np.argmin(away.to_numpy()))
+            places.append(found[["y", "x", "sigma"]].to_numpy(dtype=float)[nearest])
     return np.array(places).reshape(-1, 3)
 
 
@@ -89,7 +90,7 @@ def survivals() -> pd.DataFrame:
         for noise in NOISES:
             found = keypoint_uncertainty(image, BLUR, noise, N_SPO, kappa=KAPPA, noise_free=True)
             near = found[(found["sign"] < 0) & ((found["y"] - 16).abs() < 1) & (found["x"] > 25)]
-            keypoint = near.loc[near["value"].idxmin()]
+            keypoint = near.iloc[int(np.argmin(near["value"].to_numpy()))]
             seen = len(returns(keypoint, image, noise, "blobs"))
             rows.append((distance, noise, keypoint["survival"], seen / SHOTS))
     return pd.DataFrame(rows, columns=["distance", "noise", "predicted", "counted"])

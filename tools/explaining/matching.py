@@ -76,7 +76,10 @@ def _draw_same(ax: Axes) -> None:
     chosen = EXAMPLE.index.isin(unique.index)
     for name, rows in EXAMPLE.groupby("set"):
         mark = MARKS[int(str(name))]
-        for is_chosen, colour in ((False, palette.GREY), (True, palette.DETECTION_COLOURS["refined"])):
+        for is_chosen, colour in (
+            (False, palette.GREY),
+            (True, palette.DETECTION_COLOURS["refined"]),
+        ):
             some = rows[chosen[rows.index] == is_chosen]
             ax.plot(some["x"], some["sigma"], mark, color=colour, ms=5, mec="none", zorder=2)
     for n, (name, mark) in enumerate(MARKS.items()):

@@ -25,7 +25,7 @@ def draw() -> Figure:
     found = detect_keypoints(image, BLUR, 15, kappa=KAPPA)
     dog = scale_space(image, BLUR, 3, kappa=KAPPA).scale_slice(2)[::2, ::2]
     limit = float(np.abs(dog).max())
-    figure = style.new_figure(1.75)
+    figure = style.new_figure(1.6)
     tiles = figure.subplots(1, 5)
     pictures = {"interpolation": "nearest", "cmap": "gray"}
     frame = (-0.5, WIDTH - 0.5, HEIGHT - 0.5, -0.5)

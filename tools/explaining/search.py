@@ -118,7 +118,7 @@ def cells() -> Cells:
 
 
 def _nodes(lattice: ScaleSpace, n_columns: int) -> NDArray[np.float32]:
-    """Nodes of three slices, shape (3, n_columns, NODES), from `MARGIN` nodes before the grid on."""
+    """Nodes of three slices, shape (3, n_columns, NODES); `MARGIN` of them before the grid."""
     box = lattice.window(slice(SLICE - 1, SLICE + 2))[:, ::P, ::P]
     missing = MARGIN + NODES, MARGIN + n_columns
     padded = np.pad(box, ((0, 0), (MARGIN, missing[0]), (MARGIN, missing[1])), mode="edge")
@@ -143,21 +143,19 @@ def _along_x(pair: NDArray[np.float32]) -> tuple[Array, Array]:
     """Least and largest of the twelve coefficients of the derivative along x."""
     a, p, c, u, b, q, d, v = pair.reshape(8, NODES)
     # Four rows of coefficients: at the upper nodes, a third below, a third above the lower ones.
-    values = [_rows(value, slope) for value, slope in ((a, c), (b, d), (p, u), (q, v))]
-    left, right, slope_left, slope_right = (np.stack(each) for each in values)
+    left, right, slope_left, slope_right = (
+        _rows(value, slope) for value, slope in ((a, c), (b, d), (p, u), (q, v))
+    )
     middle = 3 * (right - left) - slope_left - slope_right
     every = np.concatenate([slope_left, middle, slope_right])
     return every.min(axis=0), every.max(axis=0)
 
 
-def _rows(value: NDArray[np.float32], slope: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+def _rows(value: NDArray[np.float32], slope: NDArray[np.float32]) -> Array:
     above, below = slice(MARGIN, MARGIN + CELLS), slice(MARGIN + 1, MARGIN + 1 + CELLS)
-    return [
-        value[above],
-        value[above] + slope[above] / 3,
-        value[below] - slope[below] / 3,
-        value[below],
-    ]
+    third = slope / 3
+    rows = value[above], value[above] + third[above], value[below] - third[below], value[below]
+    return np.stack(rows).astype(np.float64)
 
 
 ROW, FIRST, LAST = 40, 60, 100

@@ -33,7 +33,8 @@ def by_spline(pixels: Array) -> tuple[Array, Array]:
     column, weight = spline_rows(n, pixels.size, _STEP)
     source = spline_source(pixels[:, None])[:, 2]
     values = (weight * source[column[:, None] + np.arange(4)]).sum(axis=1)
-    return np.arange(n) * _STEP, values + pixels.mean()
+    level = float(pixels.mean())
+    return np.linspace(0.0, (n - 1) * _STEP, n), np.asarray(values + level)
 
 
 def draw() -> Figure:
@@ -57,7 +58,11 @@ def _draw_mirrors(ax: Axes) -> None:
     ax.plot(where[~inside], mirrored[~inside], "o", mfc="white", mec=palette.INK, ms=4, mew=0.8)
     for mirror in (-0.5, n - 0.5):
         ax.axvline(mirror, color=palette.GREY, ls="--", lw=0.8, ymax=0.86)
-    for x, text in ((-n / 2 - 0.5, "mirror image"), (n / 2 - 0.5, "image"), (1.5 * n, "mirror image")):
+    for x, text in (
+        (-n / 2 - 0.5, "mirror image"),
+        (n / 2 - 0.5, "image"),
+        (1.5 * n, "mirror image"),
+    ):
         ax.text(x, 1.09, text, ha="center", fontsize=style.SMALL, color=palette.GREY)
     ax.set(xlabel="position y (px)", ylabel="grey value", ylim=(0, 1.18), xticks=range(-8, 17, 4))
     style.letter(ax, "a", "continued by its mirror images")

@@ -47,7 +47,7 @@ def distance(places: Array, true: Array) -> Array:
 
 @cache
 def climb() -> Climb:
-    """The extremum of a small view whose discrete detection is farthest off, of those well shaped."""
+    """Of the well shaped extrema of a view, that whose discrete detection is farthest off."""
     image = view(BLUR, 112, 200)
     series = DogSeries.of_image(image, BLUR, KAPPA)
     truth = true_extrema(image, BLUR)
@@ -80,7 +80,8 @@ def _newton(series: DogSeries, begin: Array) -> Array:
     places = [begin]
     for _ in range(STEPS):
         sigma, y, x = places[-1]
-        step = newton_step(series.jets(*(np.array([value]) for value in (sigma, y, x))))[0]
+        jets = series.jets(np.array([sigma]), np.array([y]), np.array([x]))
+        step = newton_step(jets)[0]
         places.append(np.array([sigma * np.exp(step[0]), y + sigma * step[1], x + sigma * step[2]]))
     return np.stack(places)
 
@@ -103,7 +104,9 @@ def _draw_plane(ax: Axes) -> None:
     grid_sigma, grid_x = np.meshgrid(sigma, x, indexing="ij")
     y = np.full(grid_x.size, found.true[1])
     values = found.series.jets(grid_sigma.ravel(), y, grid_x.ravel()).value.reshape(grid_x.shape)
-    ax.contour(grid_x, grid_sigma, values, 16, colors=[palette.PALE], linewidths=0.9, linestyles="-")
+    ax.contour(
+        grid_x, grid_sigma, values, 16, colors=[palette.PALE], linewidths=0.9, linestyles="-"
+    )
     columns = np.arange(np.ceil(x[0] / delta), np.floor(x[-1] / delta) + 1) * delta
     slices = 1.1 * 2 ** (np.arange(0, N_SPO + 2) / N_SPO)
     for scale in slices[(slices >= sigma[0]) & (slices <= sigma[-1])]:
