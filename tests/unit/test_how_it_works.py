@@ -73,6 +73,8 @@ def test_pages_are_short_and_their_formulas_survive_markdown(page):
         # Markdown takes a backslash before a sign for its own, and bars in tables for cells.
         assert not re.search(r"\\[^a-zA-Z\s]", formula), formula
         assert "|" not in formula and "*" not in formula, formula
+        for line in formula.split("\n")[1:]:  # such a line would begin a list or a heading
+            assert not re.match(r"\s*([-+#>=]|\d+[.)])", line), formula
 
 
 def test_pages_lead_to_each_other_and_to_their_figures(monkeypatch):
