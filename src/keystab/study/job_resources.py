@@ -1,7 +1,7 @@
 """What jobs may take where time and memory are handed out, as on a cluster.
 
 Minutes and megabytes grow with the samples that a job visits, with room to spare over what
-REPRODUCING.md lists. Jobs without them are content with the defaults of a cluster's profile.
+docs/reproduce/costs.md lists. Jobs without them are content with the defaults of a cluster's profile.
 Nothing here changes a result or makes anything run again. Settings are those of
 `keystab.study.scenes.resolved`.
 
