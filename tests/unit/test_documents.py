@@ -24,10 +24,12 @@ from keystab.study.plain_yaml import read_plain_yaml
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(
     path.relative_to(ROOT).as_posix()
-    for folder in (".", "config", "docs", "results", "benchmarks/results")
-    for path in (ROOT / folder).glob("*.md")
+    for pattern in ("*.md", "config/*.md", "docs/**/*.md", "results/*.md", "benchmarks/results/*.md")
+    for path in ROOT.glob(pattern)
+    if "templates" not in path.parts
 )
-FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+STARTING = ["README.md", *(name for name in DOCUMENTS if name.startswith("docs/start/"))]
+FENCE = re.compile(r"^```(\w*|\{[\w-]+\})\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EXAMPLES = {"what_if": "cosine", "pictures": "stream"}
 PARTS = ("benchmarks", "config", "docs", "src", "tests", "tools", "workflow")
 
@@ -61,7 +63,7 @@ def settings(schema: dict, name: str = "") -> set[str]:
 
 
 def test_documents_are_found():
-    assert {"README.md", "REPRODUCING.md", "DEVIATIONS.md", "config/README.md"} <= set(DOCUMENTS)
+    assert {"README.md", "config/README.md", "docs/index.md", "docs/start/install.md"} <= set(DOCUMENTS)
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
@@ -123,7 +125,7 @@ def test_no_job_at_a_time_is_refused():
 def test_settings_of_deviations_exist():
     schema = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
     known = settings(schema)
-    rows = [line.split(" | ") for line in text_of("DEVIATIONS.md").splitlines() if " | " in line]
+    rows = [line.split(" | ") for line in text_of("docs/deviations.md").splitlines() if " | " in line]
     named = [name for row in rows for name in re.findall(r"`([\w.]+)` *[|,]", ", " + row[-1] + "|")]
     named = [name for name in named if not name.endswith(".csv")]
     assert len(named) > 25
@@ -132,28 +134,22 @@ def test_settings_of_deviations_exist():
         assert place in known, name
 
 
-def test_commands_of_the_readme_are_understood():
-    lines = "\n".join(blocks("README.md", "sh")).splitlines()
-    commands = [shlex.split(line) for line in lines if line.startswith("keystab ")]
-    assert {command[1] for command in commands} == {
-        "simulate",
-        "detect",
-        "truth",
-        "inspect",
-        "uncertainty",
-        "audit",
-    }
-    for command in commands:
+def commands_of(document: str) -> list[list[str]]:
+    """Commands of keystab that a document shows, without those that ask for help."""
+    lines = "\n".join(blocks(document, "sh")).splitlines()
+    commands = [shlex.split(line, comments=True) for line in lines if line.startswith("keystab ")]
+    return [command for command in commands if "--help" not in command]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_commands_are_understood(document):
+    for command in commands_of(document):
         build_parser().parse_args(command[1:])  # exits where it does not understand
 
 
-def test_commands_of_the_page_on_error_bars_are_understood():
-    lines = "\n".join(blocks("docs/uncertainty.md", "sh")).splitlines()
-    commands = [shlex.split(line, comments=True) for line in lines if line]
-    assert len(commands) > 3
-    for command in commands:
-        assert command[:2] == ["keystab", "uncertainty"]
-        build_parser().parse_args(command[1:])  # exits where it does not understand
+def test_the_pages_for_a_start_show_the_commands_for_pictures():
+    shown = {command[1] for document in STARTING for command in commands_of(document)}
+    assert {"detect", "truth", "inspect", "uncertainty", "audit", "whence"} <= shown
 
 
 def test_the_page_on_error_bars_has_every_column():
@@ -165,14 +161,17 @@ def test_the_page_on_error_bars_has_every_column():
     assert set(found.columns) - detected == named - detected
 
 
-def test_examples_of_the_readme_run(monkeypatch):
+EXAMPLE = re.compile(r"^```python\n(.*?)^```\n(?:\n```\n(.*?)^```\n)?", re.MULTILINE | re.DOTALL)
+
+
+# The tutorial takes longer: `make docs` and the test beside its tool run it.
+@pytest.mark.parametrize("document", sorted({*STARTING} - {"docs/start/tutorial.md"}))
+def test_examples_run_and_print_what_is_shown(document, monkeypatch):
     monkeypatch.chdir(ROOT)
-    pairs = re.findall(
-        r"^```python\n(.*?)^```\s+^```\n(.*?)^```", text_of("README.md"), re.M | re.S
-    )
-    assert len(pairs) == len(blocks("README.md", "python")) == 3
+    examples = EXAMPLE.findall(text_of(document))
+    assert len(examples) == len(blocks(document, "python"))
     names: dict = {}
-    for code, shown in pairs:
+    for code, shown in examples:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             exec(code, names)
@@ -185,7 +184,7 @@ def test_example_of_stores_runs(monkeypatch, tmp_path, capsys):
     space = scale_space(image, camera_blur=1.1, n_spo=3)
     write_scale_space(space, tmp_path / "results/scale_space/n15")
     write_views([image], [ViewSpec(1.1, 10.0, image.shape)], tmp_path / "results/views/still")
-    (code,) = blocks("REPRODUCING.md", "python")
+    (code,) = blocks("docs/reproduce/index.md", "python")
     exec(code, {})
     sizes, peak, views = capsys.readouterr().out.splitlines()
     assert sizes.startswith(str(dict(zip(("scale", "y", "x"), space.shape, strict=True))))

@@ -16,7 +16,12 @@ from keystab.utils.compiled_loops import forget_outdated
 TOOLS = Path(__file__).parents[2] / "tools"
 
 
-@pytest.mark.parametrize("name", ["interrupted", "overheads", "rule_graph", "study", "study_end"])
+NAMES = (
+    *("interrupted", "overheads", "reference_pages", "rule_graph", "study", "study_end", "tutorial"),
+)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_examples_of_tools(name, monkeypatch):
     monkeypatch.syspath_prepend(TOOLS)
     failed, tried = doctest.testmod(importlib.import_module(name))
