@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -44,8 +45,9 @@ html_math_renderer = "mathml"
 
 def as_mathml(formula: str, block: bool, place: nodes.Node) -> str:
     """A formula as browsers show it by themselves: pages need no network and no script."""
+    known = re.sub(r"\\dots\b", r"\\ldots", formula)
     try:
-        return str(latex2mathml.tex2mathml(formula, as_block=block))
+        return str(latex2mathml.tex2mathml(known, as_block=block))
     except MathError as error:
         raise ExtensionError(f"{place.source}:{place.line}: {formula}: {error}") from error
 
@@ -63,22 +65,21 @@ def block_math(writer: Any, node: nodes.math_block) -> None:
 
 
 def link_files(app: Sphinx, document: nodes.document) -> None:
-    """Make links to files outside of docs downloads, and to folders plain text."""
-    here = Path(app.env.doc2path(app.env.docname)).parent
+    """Make links to pages outside of docs downloads, and links to folders plain text."""
+    page = app.env.docname
+    here = Path(app.env.doc2path(page)).parent
     for link in list(document.findall(addnodes.pending_xref)):
-        target = link.get("reftarget", "")
-        outside = Path(os.path.normpath(here / target.partition("#")[0]))
-        if link.get("reftype") not in ("myst", "doc") or app.srcdir in outside.parents:
+        target = Path(os.path.normpath(here / link.get("reftarget", "").partition("#")[0]))
+        if link.get("reftype") != "myst" or app.srcdir in target.parents:
             continue
-        if outside.is_dir() and ROOT in (outside, *outside.parents):
+        file = target.with_name(f"{target.name}.md")
+        if link["refdomain"] == "doc" and file.is_file():
+            named = {"reftarget": os.path.relpath(file, here), "refdoc": page}
+            download = addnodes.download_reference("", "", *link.children, **named)
+            download["filename"] = str(app.env.dlfiles.add_file(page, str(file)))
+            link.replace_self(download)
+        elif target.is_dir() and ROOT in (target, *target.parents):
             link.replace_self(nodes.inline("", "", *link.children))
-        elif outside.is_file():
-            relative = os.path.relpath(outside, here)
-            node = addnodes.download_reference(
-                "", "", *link.children, reftarget=relative, refdoc=app.env.docname
-            )
-            node["filename"] = app.env.dlfiles.add_file(app.env.docname, str(outside))
-            link.replace_self(node)
 
 
 def setup(app: Sphinx) -> None:

@@ -62,8 +62,8 @@ def api() -> str:
         raise InputError("FUNCTIONS is not what keystab.__all__ has: add or remove names in it")
     parts = []
     for title, names in FUNCTIONS.items():
-        lines = [f"| `{name}` | {in_short(getattr(keystab, name))} |" for name in names]
-        parts.append("\n".join([f"## {title}", "", "| `keystab.` | |", "|---|---|", *lines]))
+        lines = [f"| `keystab.{name}` | {in_short(getattr(keystab, name))} |" for name in names]
+        parts.append("\n".join([f"## {title}", "", "| name | what it is |", "|---|---|", *lines]))
         kinds = [(directive(getattr(keystab, name)), name) for name in names]
         lines = [f".. {kind}:: keystab.{name}" for kind, name in kinds]
         parts.append("\n".join(["```{eval-rst}", *lines, "```"]))
@@ -250,7 +250,7 @@ def arguments(parser: argparse.ArgumentParser) -> Iterator[str]:
     for action in parser._actions:
         if not isinstance(action, argparse._HelpAction):
             said = formatter._expand_help(action) if action.help else ""
-            said = said.replace("|", "\\|")
+            said = said.removesuffix(" (default: None)").replace("|", "\\|")
             required = ", required" if action.required and action.option_strings else ""
             yield f"| `{invocation(action)}`{required} | {said} |"
 
