@@ -24,7 +24,7 @@ version = release = keystab.__version__
 author = "The keystab authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc"]
 exclude_patterns = ["findings/templates"]
-nitpicky = False
+highlight_language = "none"  # blocks of code say their language
 
 # Pages are Markdown as code forges show it: anchors of headings, and $formulas$.
 myst_enable_extensions = ["dollarmath"]
@@ -39,13 +39,18 @@ toc_object_entries_show_parents = "hide"
 html_theme = "furo"
 html_title = f"keystab {version}"
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_copyright = False
 html_show_sphinx = False
 html_math_renderer = "mathml"
 
 
 def as_mathml(formula: str, block: bool, place: nodes.Node) -> str:
     """A formula as browsers show it by themselves: pages need no network and no script."""
+    # \dots is not known, and of \frac12 one number would be made.
     known = re.sub(r"\\dots\b", r"\\ldots", formula)
+    known = re.sub(r"(\\[td]?frac)(\d)(\d)", r"\1{\2}{\3}", known)
     try:
         return str(latex2mathml.tex2mathml(known, as_block=block))
     except MathError as error:
