@@ -58,8 +58,8 @@ FUNCTIONS = {
 def api() -> str:
     """The page of the public names: in short for all readers, in full where Sphinx builds it."""
     known = [name for names in FUNCTIONS.values() for name in names]
-    if sorted(known) != sorted(set(keystab.__all__) - {"__version__"}):
-        raise InputError("FUNCTIONS is not what keystab.__all__ has: add or remove names in it")
+    if sorted(known) != sorted({*dir(keystab)} - {"__version__"}):
+        raise InputError("FUNCTIONS is not what keystab has: add or remove names in it")
     parts = []
     for title, names in FUNCTIONS.items():
         lines = [f"| `keystab.{name}` | {in_short(getattr(keystab, name))} |" for name in names]
@@ -126,9 +126,7 @@ def columns() -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def meaning(
-    table: str, header: Sequence[str], described: Sequence[Mapping[str, str]]
-) -> list[int]:
+def meaning(table: str, header: Sequence[str], described: Sequence[Mapping[str, str]]) -> list[int]:
     """Rows that describe the columns of a table, in the order of the columns, each once.
 
     What names the table counts before what is said of all (`*`).

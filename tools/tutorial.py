@@ -3,8 +3,8 @@
 python tools/tutorial.py           write what the blocks print, and the pictures that they draw
 python tools/tutorial.py --check   say whether the page shows what they print
 
-Blocks of `sh` run in a shell and those of `python` one after the other in one interpreter, all in a
-new folder in which `photo.png` is the photograph. A block without a name behind it is what it prints.
+Blocks of `sh` run in a shell, those of `python` one after the other in one interpreter, all in a new
+folder in which `photo.png` is the photograph. A block without a name below one is what it prints.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ PICTURE = re.compile(r"\]\((tutorial_\w+\.png)\)")
 
 
 def executed(text: str) -> str:
-    """Text of a page with what its blocks print, run in the folder where we are.
+    r"""Text of a page with what its blocks print, run in the folder where we are.
 
     Examples
     --------
-    >>> print(executed("```python\\nprint(1 + 1)\\n```\\n"))
+    >>> print(executed("```python\nprint(1 + 1)\n```\n"))
     ```python
     print(1 + 1)
     ```

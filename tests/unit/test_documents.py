@@ -24,7 +24,13 @@ from keystab.study.plain_yaml import read_plain_yaml
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(
     path.relative_to(ROOT).as_posix()
-    for pattern in ("*.md", "config/*.md", "docs/**/*.md", "results/*.md", "benchmarks/results/*.md")
+    for pattern in (
+        "*.md",
+        "config/*.md",
+        "docs/**/*.md",
+        "results/*.md",
+        "benchmarks/results/*.md",
+    )
     for path in ROOT.glob(pattern)
     if "templates" not in path.parts
 )
@@ -63,7 +69,9 @@ def settings(schema: dict, name: str = "") -> set[str]:
 
 
 def test_documents_are_found():
-    assert {"README.md", "config/README.md", "docs/index.md", "docs/start/install.md"} <= set(DOCUMENTS)
+    assert {"README.md", "config/README.md", "docs/index.md", "docs/start/install.md"} <= set(
+        DOCUMENTS
+    )
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
@@ -125,7 +133,9 @@ def test_no_job_at_a_time_is_refused():
 def test_settings_of_deviations_exist():
     schema = read_plain_yaml(ROOT / "workflow/schemas/config.schema.yaml")
     known = settings(schema)
-    rows = [line.split(" | ") for line in text_of("docs/deviations.md").splitlines() if " | " in line]
+    rows = [
+        line.split(" | ") for line in text_of("docs/deviations.md").splitlines() if " | " in line
+    ]
     named = [name for row in rows for name in re.findall(r"`([\w.]+)` *[|,]", ", " + row[-1] + "|")]
     named = [name for name in named if not name.endswith(".csv")]
     assert len(named) > 25

@@ -14,11 +14,7 @@ import pytest
 from keystab.utils.compiled_loops import forget_outdated
 
 TOOLS = Path(__file__).parents[2] / "tools"
-
-
-NAMES = (
-    *("interrupted", "overheads", "reference_pages", "rule_graph", "study", "study_end", "tutorial"),
-)
+NAMES = "interrupted overheads reference_pages rule_graph study study_end tutorial".split()
 
 
 @pytest.mark.parametrize("name", NAMES)
