@@ -3,8 +3,8 @@
 python tools/tutorial.py           write what the blocks print, and the pictures that they draw
 python tools/tutorial.py --check   say whether the page shows what they print
 
-Blocks of `sh` run in a shell, those of `python` one after the other in one interpreter, all in a new
-folder in which `photo.png` is the photograph. A block without a name below one is what it prints.
+Blocks of `sh` run in a shell, those of `python` in one interpreter, all in a new folder in which
+`photo.png` is the photograph. A block without a name below one is what it prints.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ import pytest
 from keystab.utils.compiled_loops import forget_outdated
 
 TOOLS = Path(__file__).parents[2] / "tools"
-NAMES = "interrupted overheads reference_pages rule_graph study study_end tutorial".split()
+NAMES = ["interrupted", "overheads", "reference_pages", "rule_graph", "study", "study_end"]
+NAMES += ["tutorial"]
 
 
 @pytest.mark.parametrize("name", NAMES)
