@@ -78,6 +78,16 @@ def test_columns_of_pixels_and_cubes_are_what_figures_draw(figure):
             assert set(columns) == set(TABLES[file.removesuffix(".parquet")])
 
 
+def test_a_tutorial_whose_code_fails_ends_with_an_error(capfd):
+    tool = runpy.run_path(str(ROOT / "tools/tutorial.py"))
+    with pytest.raises(SystemExit, match="exit status 1"):
+        tool["executed"]("```sh\nfalse\ntrue\n```\n")
+    with pytest.raises(ZeroDivisionError):
+        tool["executed"]("```python\nx = 0\n```\n\n```python\n1 / x\n```\n")
+    shown = "```sh\necho new\n```\n\n```\nold\n```\n"
+    assert tool["executed"](shown) == shown.replace("old", "new")
+
+
 @pytest.mark.slow
 def test_the_tutorial_prints_what_it_shows():
     command = [sys.executable, str(ROOT / "tools/tutorial.py"), "--check"]
