@@ -34,7 +34,7 @@ NO_WITH = $(if $(WITH),$(error drafts are of the default picture; for one of you
     of their own in $(WITH) and type: make study WITH="config/quick.yaml $(WITH)"))
 
 .DEFAULT_GOAL := help
-.PHONY: help study quick report audit scenes archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
+.PHONY: help study quick report audit scenes docs archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
 
 help: ## List the targets
 	@echo "make study                  the whole study"
@@ -66,6 +66,10 @@ scenes: environment ## The claims on 33 scenes, which takes hours (SCENES="lake 
 
 why: environment ## What would run, why, and for how long (TARGET=figures/fig5.pdf: for one file)
 	@python tools/why.py $(if $(TARGET),'$(subst ','\'',$(TARGET))') $(OVERLAY)
+
+docs: environment .venv-docs/.stamp ## The site with all documents: build/docs/index.html
+	python tools/tutorial.py --check
+	.venv-docs/bin/python -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
 
 test: environment ## All tests
 	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
@@ -103,10 +107,11 @@ format: environment ## Format all code and rules
 
 LOCKED = --universal --fork-strategy fewest --generate-hashes --python-version 3.11 --no-header
 
-lock: ## Renew environment.lock and audit.lock (needs uv)
+lock: ## Renew environment.lock, audit.lock and docs.lock (needs uv)
 	@command -v uv >/dev/null || { echo "error: make lock needs uv: pip install uv" >&2; exit 1; }
 	uv pip compile $(LOCKED) --extra study --extra dev pyproject.toml -o environment.lock
-	python tools/audit_requirements.py | uv pip compile $(LOCKED) - -o audit.lock
+	python tools/extra_requirements.py audit | uv pip compile $(LOCKED) - -o audit.lock
+	python tools/extra_requirements.py docs | uv pip compile $(LOCKED) - -o docs.lock
 
 clean: ## Delete all results, figures and logs
 	rm -rf figures logs
@@ -117,5 +122,8 @@ environment:
 
 .venv-audit/.stamp: audit.lock | environment
 	@tools/audit_environment
+
+.venv-docs/.stamp: docs.lock | environment
+	@tools/docs_environment
 
 FORCE:

@@ -1,4 +1,4 @@
-"""Write what each figure costs in REPRODUCING.md, from the benchmark records of the last run.
+"""Write what each figure costs in docs/reproduce/costs.md, from the records of the last run.
 
 python tools/costs.py    after `make study`
 
@@ -21,7 +21,7 @@ from keystab.provenance.shielded_environment import shielded
 from keystab.study.plan import FIGURES
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "REPRODUCING.md"
+PAGE = ROOT / "docs/reproduce/costs.md"
 BEGIN, END = "<!-- costs: begin -->\n", "<!-- costs: end -->\n"
 OF_THE_PAPER = [name for name in FIGURES if name.startswith("fig")]
 OF_OUR_OWN = [name for name in FIGURES if name not in OF_THE_PAPER]

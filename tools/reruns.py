@@ -1,4 +1,4 @@
-"""Write what a change reruns in REPRODUCING.md, from the workflow itself.
+"""Write what a change reruns in docs/reproduce/reruns.md, from the workflow itself.
 
 python tools/reruns.py           write it, in some minutes
 python tools/reruns.py --check   say whether it is up to date
@@ -35,7 +35,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from study import Clock, read_durations  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "REPRODUCING.md"
+PAGE = ROOT / "docs/reproduce/reruns.md"
 BEGIN, END = "<!-- reruns: begin -->\n", "<!-- reruns: end -->\n"
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
 BASE = settings.checked(settings.read_yaml(ROOT / "config/config.yaml"), SCHEMA)

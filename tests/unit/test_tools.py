@@ -14,11 +14,19 @@ import pytest
 from keystab.utils.compiled_loops import forget_outdated
 
 TOOLS = Path(__file__).parents[2] / "tools"
+NAMES = [
+    "findings",
+    "interrupted",
+    "overheads",
+    "reference_pages",
+    "rule_graph",
+    "study",
+    "study_end",
+]
+NAMES += ["tutorial"]
 
 
-@pytest.mark.parametrize(
-    "name", ["findings", "interrupted", "overheads", "rule_graph", "study", "study_end"]
-)
+@pytest.mark.parametrize("name", NAMES)
 def test_examples_of_tools(name, monkeypatch):
     monkeypatch.syspath_prepend(TOOLS)
     failed, tried = doctest.testmod(importlib.import_module(name))

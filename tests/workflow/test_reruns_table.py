@@ -1,4 +1,4 @@
-"""What REPRODUCING.md says of reruns is what the workflow gives, at the paper's settings."""
+"""What docs/reproduce/reruns.md says of reruns is what the workflow gives, at the paper's settings."""
 
 from __future__ import annotations
 

@@ -44,9 +44,9 @@ __all__ = ["MORE", "SOURCES", "Contents", "about_study", "is_final", "pack", "pu
 
 SOURCES = (
     "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "DEVIATIONS.md", "LICENSE", "Makefile",
-    "README.md", "REPRODUCING.md", "Snakefile", "audit.lock", "environment.lock", "pyproject.toml",
-    "results/README.md", ".ci", "benchmarks", "config", "docs", "profiles", "src", "tests", "tools",
-    "workflow",
+    "README.md", "REPRODUCING.md", "Snakefile", "audit.lock", "docs.lock", "environment.lock",
+    "pyproject.toml", "results/README.md", ".ci", "benchmarks", "config", "docs", "profiles", "src",
+    "tests", "tools", "workflow",
 )  # fmt: skip
 """Files and folders that make up the project; a file that a copy lacks is not missed."""
 

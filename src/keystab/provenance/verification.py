@@ -3,7 +3,7 @@
 Each check answers with one line, and names what does not hold. Nothing of the project's own results
 is touched, and nothing of an archive is run: it is taken apart as data in a temporary folder, where
 the rules and the code are those that are here. What this proves, and against whom, says
-REPRODUCING.md.
+docs/reproduce/archive.md.
 """
 
 from __future__ import annotations

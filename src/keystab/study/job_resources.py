@@ -1,8 +1,8 @@
 """What jobs may take where time and memory are handed out, as on a cluster.
 
 Minutes and megabytes grow with the samples that a job visits, with room to spare over what
-REPRODUCING.md lists. Jobs without them are content with the defaults of a cluster's profile.
-Nothing here changes a result or makes anything run again. Settings are those of
+docs/reproduce/costs.md lists. Jobs without them are content with the defaults of a cluster's
+profile. Nothing here changes a result or makes anything run again. Settings are those of
 `keystab.study.scenes.resolved`.
 
 Every job has one thread: matrix products differ in their last digits between numbers of threads.

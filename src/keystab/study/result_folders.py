@@ -13,9 +13,9 @@ __all__ = ["FOLDERS", "folder_problem", "normal_folder", "path_problems", "with_
 FOLDERS = ("results", "figures", "logs")
 
 _OWN = {
-    "snakefile", "makefile", "audit.lock", "environment.lock", "pyproject.toml", "archive.md",
-    "license", "benchmarks", "config", "docs", "profiles", "settings", "src", "tests", "tools",
-    "workflow",
+    "snakefile", "makefile", "audit.lock", "docs.lock", "environment.lock", "pyproject.toml",
+    "archive.md", "license", "benchmarks", "config", "docs", "profiles", "settings", "src", "tests",
+    "tools", "workflow",
 }  # fmt: skip
 """Names, in small letters, that no folder of results can have: they are the project's own."""
 
