@@ -37,6 +37,7 @@ SETTINGS = """
 samples: [one, two]
 keystab:
   reference: mine.png
+  reference_sha256: null
   semigroup: {sigma_count: 29}
   sets: {unbalanced: {height: null, width: null}}
   results: out/results
