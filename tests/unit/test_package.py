@@ -164,12 +164,11 @@ def test_commands_work_elsewhere(installed, line, made):
 @pytest.mark.slow
 def test_a_function_is_audited_elsewhere(installed):
     (installed.work / "my_module.py").write_text(DETECTOR)
-    done = installed.keystab("audit my_module:mine --quick --scene leaves.png -o audit")
-    if "leaves.png:" in done.stderr and done.returncode:  # too small a scene says so
-        done = installed.keystab("audit my_module:mine --quick -o audit")
+    done = installed.keystab("audit my_module:mine --quick -o audit")
     assert done.returncode == 0, done.stderr
     table = pd.read_csv(installed.work / "audit/audit.csv")
-    mine = table[(table["detector"] == "mine") & (table["condition"] == "blobs")]
+    mine = table[(table["detector"] == "my_module:mine") & (table["condition"] == "blobs")]
+    assert len(mine) == 1
     assert mine["bias_y"].abs().max() < 0.05 and (installed.work / "audit/audit.png").exists()
 
 

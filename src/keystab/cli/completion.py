@@ -42,8 +42,8 @@ class _Argument(NamedTuple):
     names: tuple[str, ...]
     metavar: str
     about: str
-    has_value: bool
-    many: bool
+    values: int | str
+    """How many it takes: 0, 1, another number, or + or * for any."""
     words: tuple[str, ...]
     files: bool
 
@@ -88,8 +88,7 @@ def _arguments(command: str, parser: Parser) -> list[_Argument]:
                 tuple(its.option_strings),
                 its.metavar if isinstance(its.metavar, str) else its.dest,
                 _short(its.help or ""),
-                its.nargs != 0,
-                its.nargs in ("+", "*") or isinstance(its.nargs, int),
+                1 if its.nargs is None or its.nargs == "?" else its.nargs,
                 words,
                 its.type is Path or its.dest in _FILES,
             )
@@ -100,7 +99,7 @@ def _arguments(command: str, parser: Parser) -> list[_Argument]:
 def _short(text: str) -> str:
     """The first part of what is said of an argument, without what shells would read."""
     first = re.split(r"[;:(]", text.replace("%%", "%"))[0].strip()
-    plain = re.sub(r"[^\w ,.%-]", "", first)
+    plain = re.sub(r"[^\w ,./%-]", "", first)
     return plain if len(plain) <= _LONGEST else plain[:_LONGEST].rpartition(" ")[0]
 
 
@@ -118,7 +117,7 @@ def _bash(about: Mapping[str, str], arguments: Mapping[str, list[_Argument]]) ->
     values, options, plain = [], [], []
     for command, its in arguments.items():
         for each in _options(its):
-            if each.has_value:
+            if each.values:
                 cases = " | ".join(f"'{command} {name}'" for name in each.names)
                 values.append(f"        {cases}) words='{' '.join(each.words)}' ;;")
         names = " ".join(name for each in _options(its) for name in each.names)
@@ -193,10 +192,12 @@ def _zsh_specs(argument: _Argument) -> list[str]:
         words = " ".join(argument.words)
         action = f"_alternative 'words:word:({words})' 'files:file:_files'"
         action = f"{{{action}}}".replace("'", '"') if argument.files else f"({words})"
+    value = f":{argument.metavar}:{action}"
+    any_number = argument.values in ("+", "*")
     if not argument.names:
-        return [f"'{'*' if argument.many else ''}:{argument.metavar}:{action}'"]
-    value = f":{argument.metavar}:{action}" if argument.has_value else ""
-    return [f"'{name}[{argument.about}]{value}'" for name in argument.names]
+        return [f"'{'*' if any_number else ''}{value}'"]
+    values = value * (1 if any_number else int(argument.values))
+    return [f"'{name}[{argument.about}]{values}'" for name in argument.names]
 
 
 def _fish(about: Mapping[str, str], arguments: Mapping[str, list[_Argument]]) -> list[str]:
@@ -215,7 +216,7 @@ def _fish(about: Mapping[str, str], arguments: Mapping[str, list[_Argument]]) ->
                 f"-l {name[2:]}" if name.startswith("--") else f"-s {name[1:]}"
                 for name in each.names
             ]
-            value = (" -r -F" if each.files else " -x") if each.has_value else ""
+            value = (" -r -F" if each.files else " -x") if each.values else ""
             own = f" -a '{' '.join(each.words)}'" if each.words else ""
             lines.append(f"{where} {' '.join(names)}{value}{own} -d '{each.about}'")
     return lines
