@@ -76,7 +76,7 @@ def tell_of_compilation() -> None:
             module = event.data["dispatcher"].py_func.__module__
             if not self.told and module.startswith("keystab."):
                 self.told = True
-                print("keystab compiles its loops, once, in up to a minute", file=sys.stderr)
+                print("keystab compiles its loops, which takes some seconds once", file=sys.stderr)
 
         def on_end(self, event: event.Event) -> None:
             pass
