@@ -124,7 +124,7 @@ class Installed:
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
     made = Installed(wheel, tmp_path_factory.mktemp("elsewhere"))
-    scene = made.keystab("scene dead-leaves --shape 120 160 -o leaves.png")
+    scene = made.keystab("scene fractal --shape 120 160 -o field.png")
     assert scene.returncode == 0, scene.stderr
     return made
 
@@ -132,8 +132,8 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
 @pytest.mark.slow
 def test_the_library_answers_elsewhere(installed):
     code = (
-        "import keystab, numpy as np; print(keystab.__file__); "
-        "print(len(keystab.detect_keypoints(np.random.default_rng(0).random((30, 40)), 0.8)))"
+        "import keystab; print(keystab.__file__); scene = keystab.read_picture('field.png'); "
+        "print(len(keystab.detect_keypoints(scene, 0.8)))"
     )
     done = installed.run(sys.executable, "-P", "-c", code)
     assert done.returncode == 0, done.stderr
@@ -147,12 +147,12 @@ def test_the_library_answers_elsewhere(installed):
     [
         ("--help", ""),
         ("inspect --environment", ""),
-        ("inspect leaves.png", ""),
+        ("inspect field.png", ""),
         ("completion bash", ""),
-        ("detect leaves.png --camera-blur 0.8 -o found.csv", "found.csv"),
-        ("truth leaves.png --camera-blur 0.8 -o true.parquet", "true.parquet"),
-        ("uncertainty leaves.png --camera-blur 0.8 --n-oct 1 -o bars.csv --draw bars.png", "bars.png"),
-        ("simulate leaves.png seen.tiff --blur 0.8 --step 2", "seen.tiff"),
+        ("detect field.png --camera-blur 0.8 -o found.csv", "found.csv"),
+        ("truth field.png --camera-blur 0.8 -o true.parquet", "true.parquet"),
+        ("uncertainty field.png --camera-blur 0.8 --n-oct 1 -o bars.csv --draw bars.png", "bars.png"),
+        ("simulate field.png seen.tiff --blur 0.8 --step 2", "seen.tiff"),
     ],
 )  # fmt: skip
 def test_commands_work_elsewhere(installed, line, made):
