@@ -113,7 +113,7 @@ class Installed:
         }
         env = {**kept, "PYTHONPATH": str(self.packages), "HOME": str(self.work)}
         return subprocess.run(
-            command, cwd=self.work, env=env, capture_output=True, text=True, timeout=300
+            command, cwd=self.work, env=env, capture_output=True, text=True, timeout=900
         )
 
     def keystab(self, line: str) -> subprocess.CompletedProcess[str]:
