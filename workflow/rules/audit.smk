@@ -10,10 +10,9 @@ from keystab.provenance.bare_code import bare_digest
 
 WORKER = code_digest.PACKAGE_FOLDER / "audit/worker.py"
 
-if Path(workflow.basedir, ".venv-audit/bin/python").exists():
-    os.environ.setdefault(
-        "KEYSTAB_AUDIT_PYTHON", str(Path(workflow.basedir, ".venv-audit/bin/python"))
-    )
+AUDITING = FILES.beside(".venv-audit/bin/python")
+if AUDITING and Path(AUDITING).exists():
+    os.environ.setdefault("KEYSTAB_AUDIT_PYTHON", str(Path(AUDITING).absolute()))
 
 
 wildcard_constraints:
@@ -70,7 +69,7 @@ rule audit_detector:
         ),
         libraries=parameter(
             "audit.lock",
-            hashlib.sha256(Path(workflow.basedir, "audit.lock").read_bytes()).hexdigest(),
+            hashlib.sha256(Path(FILES.own("audit.lock")).read_bytes()).hexdigest(),
         ),
     message:
         "Auditing {wildcards.detector}: {wildcards.condition}{params.scene}"

@@ -14,7 +14,7 @@ rule claims:
     """A verdict for every claim of the paper."""
     input:
         tables=placed(plan.table_files, RESULTS, CLAIMED),
-        claims=ancient(local("config/claims.yaml")),  # its comments do not matter
+        claims=ancient(local(FILES.own("config/claims.yaml"))),  # its comments do not matter
     output:
         csv=f"{HERE}claims.csv",
         json=f"{HERE}claims.json",

@@ -28,21 +28,21 @@ from keystab.study import (
 from keystab.study.claims import read_claims, table_names
 from keystab.study.plain_yaml import read_plain_yaml
 from keystab.study.rule_parameters import Rules
+from keystab.study.workflow_files import WorkflowFiles
+
+# The folder that is worked in can be another one than that of these files.
+FILES = WorkflowFiles(workflow.current_basedir, workflow.sourcecache.get_path)
 
 try:
     # Snakemake has merged these; what it dropped or misread without a word is refused here.
-    settings.read_yaml(
-        Path(workflow.basedir, "config/config.yaml"), *workflow.overwrite_configfiles
-    )
-    config.update(
-        settings.checked(
-            config,
-            read_plain_yaml(Path(workflow.basedir, "workflow/schemas/config.schema.yaml")),
-        )
-    )
+    settings.read_yaml(*workflow.configfiles)
+    given = settings.read_yaml(FILES.own("config/config.yaml"))
+    settings.merge(given, config)  # has it already, but for a module's and with -d
+    schema = read_plain_yaml(FILES.own("workflow/schemas/config.schema.yaml"))
+    config.update(FILES.with_pictures(settings.checked(given, schema)))
     feasibility.require(config)
-    CLAIMS = read_claims(Path(workflow.basedir, "config/claims.yaml"))
-    CORPUS = corpus.read_corpus(Path(workflow.basedir, "config/scenes.csv"))
+    CLAIMS = read_claims(FILES.own("config/claims.yaml"))
+    CORPUS = FILES.with_photographs(corpus.read_corpus(FILES.own("config/scenes.csv")))
     CLAIMED = [f"{name}.csv" for name in table_names(CLAIMS)]
 except InputError as problems:
     sys.exit(str(problems))
@@ -70,7 +70,7 @@ RULES = Rules(
     RESULTS,
     SCENES,
     code_digest.fingerprint,
-    software=imported_software.software_digest(Path(workflow.basedir, "environment.lock")),
+    software=imported_software.software_digest(Path(FILES.own("environment.lock"))),
 )
 of, column, files, placed = RULES.of, RULES.column, RULES.files, RULES.placed
 detections, stage, setting = RULES.detections, RULES.stage, RULES.setting
@@ -107,7 +107,9 @@ def studies_of_pictures():
     """Studies of all pictures that are compared; stop where one is missing that no rule makes."""
     try:
         return claims_by_scene.finished(
-            "config/config.yaml", config["pictures"], made=f"{RESULTS}/claims.csv"
+            FILES.own("config/config.yaml"),
+            [FILES.found(overlay) for overlay in config["pictures"]],
+            made=f"{RESULTS}/claims.csv",
         )
     except InputError as problem:
         sys.exit(str(problem))

@@ -225,10 +225,17 @@ def _warn_of_compression(picture: Path) -> None:
 
 
 def inspect(args: argparse.Namespace) -> None:
-    """Say in words what a picture, a store or a table holds."""
-    from keystab.io.describe import describe
+    """Say in words what a picture, a store or a table holds, or what keystab runs with."""
+    if args.environment:
+        from keystab.cli.environment import environment
 
-    print(describe(args.path))
+        print(environment())
+    elif args.path is None:
+        raise InputError("nothing to look into: give a picture, a store or a table")
+    if args.path is not None:
+        from keystab.io.describe import describe
+
+        print(describe(args.path))
 
 
 def _check_outputs(args: argparse.Namespace) -> None:

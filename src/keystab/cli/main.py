@@ -19,7 +19,7 @@ from keystab.utils.memory import require_start, too_little
 
 __all__ = ["main"]
 
-_LIGHT = ("inspect", "simulate", "scene", "blur", "whence")
+_LIGHT = ("inspect", "simulate", "scene", "blur", "whence", "completion")
 """Commands that compile nothing and draw nothing."""
 
 

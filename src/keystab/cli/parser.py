@@ -6,34 +6,30 @@ import argparse
 import math
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from keystab._version import __version__
 from keystab.cli.audit import audit
+from keystab.cli.completion import SHELLS, completion
+from keystab.cli.known_parser import BAD_INPUT, Parser
 from keystab.cli.library import blur, detect, inspect, scene, simulate, truth, uncertainty
 from keystab.cli.study_parser import add_study_commands
 
-BAD_INPUT = 2
+__all__ = ["BAD_INPUT", "build_parser"]
+
 _PICTURE = "PNG, TIFF, JPEG, PNM or npy; turned upright as its EXIF orientation asks"
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser that reports an error in one line, without its usage."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
-
-
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """Parser of all commands."""
-    parser = _Parser(
+    parser = Parser(
         prog="keystab",
         description="Simulated views, scale-space keypoints, and what files hold.",
     )
     parser.add_argument("--version", action="version", version=f"keystab {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    parser.begin_commands()
     _simulate_arguments(
-        commands.add_parser(
+        parser.add_command(
             "simulate",
             help="take a view of a picture with a simulated camera",
             description="Blur a picture and sample it, as a camera that sees it would: exactly, "
@@ -42,7 +38,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
     )
     _scene_arguments(
-        commands.add_parser(
+        parser.add_command(
             "scene",
             help="make a scene: leaves, a random field, edges, strokes or text",
             description="Make a picture of a kind whose properties are known, to be seen by a "
@@ -51,7 +47,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
     )
     _detect_arguments(
-        commands.add_parser(
+        parser.add_command(
             "detect",
             help="detect the keypoints of a picture",
             description="Detect the extrema of the difference-of-Gaussians scale-space of a "
@@ -60,7 +56,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
     )
     _uncertainty_arguments(
-        commands.add_parser(
+        parser.add_command(
             "uncertainty",
             help="detect keypoints, with error bars and the chance that each is found again",
             description="Detect the keypoints of a photograph, and say of each how far off it is "
@@ -69,7 +65,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
     )
     _blur_arguments(
-        commands.add_parser(
+        parser.add_command(
             "blur",
             help="fit a Gaussian to a picture of a point spread function",
             description="Say what camera blur a measured point spread function has: the standard "
@@ -78,7 +74,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
     )
     _truth_arguments(
-        commands.add_parser(
+        parser.add_command(
             "truth",
             help="find the true extrema of a picture",
             description="Find all extrema of the continuous difference-of-Gaussians scale-space "
@@ -87,7 +83,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
     )
     _audit_arguments(
-        commands.add_parser(
+        parser.add_command(
             "audit",
             help="hold detectors of others, or one of your own, against what is there",
             description="Show detectors views of a scene and isolated blobs whose extrema are "
@@ -97,21 +93,41 @@ def build_parser() -> argparse.ArgumentParser:
             "installed; make audit installs all but kornia in .venv-audit (--python).",
         )
     )
-    to = commands.add_parser(
-        "inspect",
-        help="say what a picture, a store or a table holds",
-        description="Say in words what a picture, a stored scale-space, a stored set of views or a "
-        "table of keypoints holds.",
+    _inspect_arguments(
+        parser.add_command(
+            "inspect",
+            help="say what a picture, a store or a table holds, or what keystab runs with here",
+            description="Say in words what a picture, a stored scale-space, a stored set of views "
+            "or a table of keypoints holds; with --environment, what keystab runs with here, for "
+            "reports of errors.",
+        )
     )
-    to.add_argument(
-        "path", metavar="PATH", type=Path, help="picture, store, .csv or .parquet table"
+    add_study_commands(parser.add_command)
+    to = parser.add_command(
+        "completion",
+        help="print what makes a shell complete this command",
+        description="Print a script that makes the Tab key of a shell complete commands, options "
+        "and their words. For bash: keystab completion bash > "
+        "~/.local/share/bash-completion/completions/keystab; for zsh, _keystab in a folder of "
+        "$fpath; for fish, ~/.config/fish/completions/keystab.fish.",
     )
-    to.set_defaults(run=inspect)
-    add_study_commands(commands.add_parser)
+    to.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
+    to.set_defaults(run=completion, parser=parser)
     return parser
 
 
-def _simulate_arguments(to: argparse.ArgumentParser) -> None:
+def _inspect_arguments(to: Parser) -> None:
+    to.set_defaults(run=inspect)
+    to.add_argument(
+        "path", metavar="PATH", type=Path, nargs="?", help="picture, store, .csv or .parquet table"
+    )
+    to.add_argument(
+        "--environment", action="store_true",
+        help="say the versions of keystab, Python and the libraries, and what the machine is",
+    )  # fmt: skip
+
+
+def _simulate_arguments(to: Parser) -> None:
     to.set_defaults(run=simulate)
     to.add_argument("picture", metavar="PICTURE", type=Path, help=f"the scene: {_PICTURE}")
     to.add_argument(
@@ -147,7 +163,7 @@ def _simulate_arguments(to: argparse.ArgumentParser) -> None:
     )
 
 
-def _scene_arguments(to: argparse.ArgumentParser) -> None:
+def _scene_arguments(to: Parser) -> None:
     to.set_defaults(run=scene)
     to.add_argument("kind", metavar="KIND", help="dead-leaves, fractal, edges, line-art or text")
     to.add_argument(
@@ -169,13 +185,13 @@ def _scene_arguments(to: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def _detect_arguments(to: argparse.ArgumentParser) -> None:
+def _detect_arguments(to: Parser) -> None:
     to.set_defaults(run=detect)
     flags = _search_flags(to, "sign", n_spo=3, n_oct=1)
     to.set_defaults(parameters=[flag.dest for flag in flags])
 
 
-def _uncertainty_arguments(to: argparse.ArgumentParser) -> None:
+def _uncertainty_arguments(to: Parser) -> None:
     to.set_defaults(run=uncertainty)
     colours = ("survival", "sign", "conditioning")
     flags = _search_flags(to, *colours, n_spo=15, n_oct="all")
@@ -205,7 +221,7 @@ class _Noise(argparse.Action):
         setattr(namespace, self.dest, values[0] if len(values) == 1 else tuple(values))
 
 
-def _table_arguments(to: argparse.ArgumentParser, *colours: str) -> argparse.Action:
+def _table_arguments(to: Parser, *colours: str) -> argparse.Action:
     """Add picture, table, drawing and camera blur; returns the last."""
     to.add_argument("picture", metavar="PICTURE", type=Path, help=_PICTURE)
     to.add_argument(
@@ -213,21 +229,21 @@ def _table_arguments(to: argparse.ArgumentParser, *colours: str) -> argparse.Act
         help="table to write, .csv or .parquet; if not given, a terminal gets a summary, and a "
         "pipe the table as CSV",
     )  # fmt: skip
-    drawing = to.add_argument_group("drawing")
-    drawing.add_argument(
+    drawing = to.add_group("drawing")
+    drawing(
         "--draw", metavar="FILE", type=Path, default=argparse.SUPPRESS,
         help="draw the keypoints on the picture, .png or .svg: circles of radius sigma, 95 %% "
         "ellipses where there are error bars",
     )  # fmt: skip
-    drawing.add_argument(
+    drawing(
         "--colour", choices=colours, default=argparse.SUPPRESS,
         help=f"what colours tell; {colours[0]} if not given",
     )  # fmt: skip
-    drawing.add_argument(
+    drawing(
         "--part", type=int, nargs=4, metavar=("Y", "X", "H", "W"), default=argparse.SUPPRESS,
         help="draw a part: first row, first column, height and width in pixels",
     )  # fmt: skip
-    drawing.add_argument(
+    drawing(
         "--enlarge", type=float, metavar="F", default=argparse.SUPPRESS,
         help="enlarge ellipses so many times; if not given, so that half of them fit their circles",
     )  # fmt: skip
@@ -239,9 +255,7 @@ def _table_arguments(to: argparse.ArgumentParser, *colours: str) -> argparse.Act
     )  # fmt: skip
 
 
-def _search_flags(
-    to: argparse.ArgumentParser, *colours: str, n_spo: int, n_oct: int | str
-) -> list[argparse.Action]:
+def _search_flags(to: Parser, *colours: str, n_spo: int, n_oct: int | str) -> list[argparse.Action]:
     """Add the parameters of a detection; returns them."""
     return [
         _table_arguments(to, *colours),
@@ -291,7 +305,7 @@ def _search_flags(
     ]  # fmt: skip
 
 
-def _blur_arguments(to: argparse.ArgumentParser) -> None:
+def _blur_arguments(to: Parser) -> None:
     to.set_defaults(run=blur)
     to.add_argument(
         "picture", metavar="PSF", type=Path,
@@ -317,7 +331,7 @@ def _background(text: str) -> float | str:
         raise argparse.ArgumentTypeError(f"{text!r} is no level; give a number or border") from None
 
 
-def _truth_arguments(to: argparse.ArgumentParser) -> None:
+def _truth_arguments(to: Parser) -> None:
     to.set_defaults(run=truth)
     flags = [
         _table_arguments(to, "sign", "conditioning"),
@@ -336,7 +350,7 @@ def _truth_arguments(to: argparse.ArgumentParser) -> None:
     to.set_defaults(parameters=[flag.dest for flag in flags])
 
 
-def _audit_arguments(to: argparse.ArgumentParser) -> None:
+def _audit_arguments(to: Parser) -> None:
     to.set_defaults(run=audit)
     to.add_argument(
         "detectors", metavar="DETECTOR", nargs="+",

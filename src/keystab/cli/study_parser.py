@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from keystab.cli.known_parser import Parser
 from keystab.cli.study import archive, reference, verify, whence
 
 __all__ = ["add_study_commands"]
 
 
-def add_study_commands(add_parser: Callable[..., argparse.ArgumentParser]) -> None:
+def add_study_commands(add_parser: Callable[..., Parser]) -> None:
     """Add the commands that are about the study; they are given in the project's folder."""
     to = add_parser(
         "whence",
@@ -60,7 +60,7 @@ def add_study_commands(add_parser: Callable[..., argparse.ArgumentParser]) -> No
     to.set_defaults(run=verify)
 
 
-def _configfile_argument(to: argparse.ArgumentParser) -> None:
+def _configfile_argument(to: Parser) -> None:
     to.add_argument(
         "--configfile", nargs="+", default=[], metavar="FILE",
         help="settings of the run, laid over config/config.yaml as for snakemake",
