@@ -7,6 +7,7 @@ import figure_tables
 import matplotlib
 import numpy as np
 import pytest
+from figure_labels import collisions
 from PIL import Image
 
 from keystab import __version__
@@ -126,6 +127,22 @@ def test_panels_carry_their_letters(n, letters, drawn):
     titles = {ax.get_label(): ax.get_title(loc="left") for ax in drawn[n].axes}
     for name in letters:
         assert titles[name].startswith(rf"$\bf{{({name})}}$")
+
+
+@pytest.mark.parametrize("n", NUMBERS)
+def test_no_label_lies_on_points_curves_or_another_label(n, drawn):
+    assert collisions(drawn[n]) == []
+
+
+def test_dashed_means_the_coarse_sampling_in_every_figure(drawn):
+    dashed = {
+        (n, line.get_label().split(",")[0])
+        for n in NUMBERS
+        for ax in drawn[n].axes
+        for line in ax.get_lines()
+        if line.get_linestyle() not in ("-", ":", "None")
+    }
+    assert dashed == {(8, "3"), ("S1", "3"), ("S5", "3")}
 
 
 @pytest.mark.parametrize("n", [5, 6])
