@@ -173,9 +173,8 @@ def number(text: str) -> float:
         return 0.0
 
 
-
 def picture(config: Mapping[str, Any]) -> dict[str, str]:
-    """Name of the picture that was studied, its size, and a small copy; empty where there is none."""
+    """Name of the picture that was studied, its size, and a small copy, where there is one."""
     from keystab.io.pictures import read_picture
 
     name = config.get("reference")
@@ -197,7 +196,9 @@ def commit() -> str:
     said_by_git = []
     for command in ("rev-parse --show-toplevel", "rev-parse HEAD", "status --porcelain -uno"):
         try:
-            run = subprocess.run(["git", *command.split()], cwd=ROOT, capture_output=True, text=True)
+            run = subprocess.run(
+                ["git", *command.split()], cwd=ROOT, capture_output=True, text=True
+            )
         except OSError:
             return "unknown, git is not installed"
         if run.returncode:
@@ -226,9 +227,7 @@ def facts(
     ]
 
 
-def page(
-    config: Mapping[str, Any], overlays: Sequence[object], made_from: Any, edges: Any
-) -> str:
+def page(config: Mapping[str, Any], overlays: Sequence[object], made_from: Any, edges: Any) -> str:
     """The page, from the files of a finished run."""
     path = ROOT / config["results"] / "claims.json"
     claims = in_order(json.loads(path.read_text(encoding="utf-8")))

@@ -120,15 +120,17 @@ def origin(quantity: Quantity) -> str:
 
 
 def shown(value: float | str | None) -> str:
-    """Write a number for people: four digits, or all of a whole number.
+    """Write a number for people: three digits, or all of a whole number.
 
     Examples
     --------
-    >>> shown(0.123456), shown(12345.0), shown(None), shown("inf")
-    ('0.1235', '12345', 'missing', '∞')
+    >>> shown(-0.123456), shown(12345.0), shown(None), shown("inf")
+    ('−0.123', '12345', 'missing', '∞')
     """
     if value is None:
         return "missing"
     if isinstance(value, str):
         return value.replace("inf", "∞")
-    return f"{value:.0f}" if value == round(value) and abs(value) < 1e15 else f"{value:.4g}"
+    whole = value == round(value) if abs(value) < 1e15 else False
+    text = f"{value:.0f}" if whole or 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
+    return text.replace("-", "−")

@@ -17,7 +17,7 @@ from keystab.study.plain_yaml import read_plain_yaml
 
 ROOT = Path(__file__).parents[2]
 FIGURES = ("fig4", "predictors", "fig1")
-HOSTILE = '<script>alert(1)</script><img src=x onerror=alert(2)>"\'&'
+HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&"
 IN_CAPTION = "3\n\n.. raw:: html\n\n   <script>alert(3)</script>\n\n`x <javascript:alert(4)>`_"
 
 
@@ -79,7 +79,8 @@ def text(tmp_path_factory):
             for table in importlib.import_module(f"keystab.figures.{name}").TABLES:
                 (folder / "tables" / table).touch()
         (folder / "claims.json").write_text(json.dumps(CLAIMS))
-        return report.page(config, [HOSTILE], [(HOSTILE, "0" * 64)], {("simulate", "fig4")})
+        edges = {("simulate", "detect"), ("detect", "match_grid"), ("match_grid", "fig4")}
+        return report.page(config, [HOSTILE], [(HOSTILE, "0" * 64)], edges)
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +115,9 @@ def test_nothing_of_strangers_becomes_part_of_the_page(page, text):
     assert tags.count("script") == 1 and "b" not in page.all("src")
     assert not any(name.startswith("on") for _, attrs in page.tags for name in attrs)
     assert not any("javascript:" in str(value) for _, a in page.tags for value in a.values())
-    assert page.words.count(HOSTILE) >= 5  # statement twice, note, paper, overlay and so on: as text
+    assert (
+        page.words.count(HOSTILE) >= 5
+    )  # statement twice, note, paper, overlay and so on: as text
     assert "alert(3)" in page.words  # in a caption, as text
     policy = next(a["content"] for tag, a in page.tags if "http-equiv" in a)
     script = text.split("<script>")[1].split("</script>")[0]

@@ -16,7 +16,10 @@ from keystab.utils.compiled_loops import forget_outdated
 TOOLS = Path(__file__).parents[2] / "tools"
 
 
-@pytest.mark.parametrize("name", ["interrupted", "overheads", "report", "report_words", "rule_graph", "study", "study_end"])
+@pytest.mark.parametrize(
+    "name",
+    ["interrupted", "overheads", "report", "report_words", "rule_graph", "study", "study_end"],
+)
 def test_examples_of_tools(name, monkeypatch):
     monkeypatch.syspath_prepend(TOOLS)
     failed, tried = doctest.testmod(importlib.import_module(name))

@@ -101,7 +101,9 @@ def _draw_added_blur(ax: Axes, rows: DataFrame, colour: str) -> None:
     }
     for depth, (column, options) in enumerate(lines.items()):
         ax.plot(sigma, _added(rows[column], c), label=column, zorder=2 + depth, **options)
-    ax.axvline(LIMIT, ymax=0.42, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, zorder=1)
+    ax.axvline(
+        LIMIT, ymax=0.42, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, zorder=1
+    )
     ax.set(xlim=(0.0, sigma[-1]), xticks=np.arange(0.0, sigma[-1] + 0.01, 0.5))
     ax.set_ylim(0.0, 1.03 * _added(rows["theory"], c).max())
     ax.set_xlabel(r"$\sigma$ of one pass (px)")

@@ -204,7 +204,14 @@ def _plain_numbers(ax: Axes) -> None:
 def _draw_rule(ax: Axes, comparisons: Sequence[Comparison], colours: Colours) -> None:
     """Draw the second octave at a noise against the first at half of it, and their equality."""
     style.letter(ax, "e", "one octave = half the noise?")
-    ax.plot([0, 100], [0, 100], color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, label="equal")
+    ax.plot(
+        [0, 100],
+        [0, 100],
+        color=palette.GREY,
+        linewidth=0.7,
+        linestyle=style.REFERENCE,
+        label="equal",
+    )
     style.direct_label(ax, 60, 60, "equal", palette.GREY, right=8.0, up=-4.0, ha="left")
     for noise, half, whole in comparisons:
         colour = colours.get(noise, palette.INK)

@@ -114,7 +114,14 @@ def _name_groups(ax: Axes, areas: DataFrame) -> None:
 
 def _draw_roc(ax: Axes, roc: DataFrame) -> None:
     """Draw the ROC curves and the diagonal of a feature that knows nothing."""
-    ax.plot([0, 100], [100, 0], color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, label="chance")
+    ax.plot(
+        [0, 100],
+        [100, 0],
+        color=palette.GREY,
+        linewidth=0.7,
+        linestyle=style.REFERENCE,
+        label="chance",
+    )
     for feature in PANELS:
         rows = _of(roc, feature).sort_values(
             ["specificity", "sensitivity"], ascending=[True, False]

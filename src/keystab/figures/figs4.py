@@ -137,7 +137,14 @@ def _draw_operators(ax: Axes, rows: DataFrame) -> None:
         style.direct_label(ax, last, kappa**-0.5, name, colour, up=up)
     blob = np.geomspace(rows["blob"].min(), last, 50)
     first = rows["sigma_min"].iloc[0] / blob
-    ax.plot(blob, first, color=palette.GREY, linewidth=0.8, linestyle=style.REFERENCE, label="first scale")
+    ax.plot(
+        blob,
+        first,
+        color=palette.GREY,
+        linewidth=0.8,
+        linestyle=style.REFERENCE,
+        label="first scale",
+    )
     low = min(kappa**-0.5 for kappa in kappas)
     ax.set_ylim(low - 0.09, 1.09)
     # Beside the curve, in the region where there is nothing.

@@ -200,7 +200,7 @@ def _draw_all(ax: Axes, readings: DataFrame) -> None:
     )  # fmt: skip
     signs = ("round: any", "square: one-to-one", "open: grid scale", "pale: soft range",
              f"size: {limits[0]:g} to {limits[-1]:g} px")  # fmt: skip
-    left = [("grey: the paper", palette.GREY)]
+    left: list[tuple[str, Any]] = [("grey: the paper", palette.GREY)]
     left += [(_tolerance(each), shades[each]) for each in tolerances]
     _list_above(ax, left, [(sign, palette.INK) for sign in signs], float(always.max()))
     style.finish_axes(ax)

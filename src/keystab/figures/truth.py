@@ -48,7 +48,7 @@ CAUSE_NAMES = {
 }
 """What a keypoint can be, in words."""
 
-ERROR_LINES = {
+ERROR_LINES: dict[str, dict[str, Any]] = {
     "median": {"linewidth": 1.5},
     "p90": {"linewidth": 0.6},
     "rms": {"linewidth": 0.6, "marker": "s", "markersize": 2.2},
@@ -113,7 +113,14 @@ def _name_detections(figure: Figure) -> None:
         Line2D([], [], color=colour, linewidth=1.5, label=f"{detections} extrema")
         for detections, colour in palette.DETECTION_COLOURS.items()
     ]
-    lines.append(Line2D([], [], label="cosine series instead of the spline, (a) to (d)", **_circles(palette.GREY)))
+    lines.append(
+        Line2D(
+            [],
+            [],
+            label="cosine series instead of the spline, (a) to (d)",
+            **_circles(palette.GREY),
+        )
+    )
     figure.legend(handles=lines, loc="outside upper left", ncols=len(lines), frameon=False)
 
 
@@ -143,7 +150,9 @@ def _draw_share(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> No
                 linewidth=0.6,
             )  # fmt: skip
         other = _of(cosine, detections)
-        ax.plot(other["n_spo"], 100 * other[name], label=f"{detections}, cosine", **_circles(colour))
+        ax.plot(
+            other["n_spo"], 100 * other[name], label=f"{detections}, cosine", **_circles(colour)
+        )
     bottom = 100 * min(spline[f"{name}_low"].min(), cosine[name].min())
     room = 0.2 if name == "precision" else 0.03  # for what thin lines mean
     ax.set_ylim(bottom - room * (100 - bottom), 100 + 0.06 * (100 - bottom))
