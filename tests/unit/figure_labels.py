@@ -14,10 +14,11 @@ from matplotlib.transforms import Bbox
 def collisions(figure: Figure) -> list[tuple[str, str]]:
     """Return labels that lie on points or curves, with these, and labels that lie on labels.
 
+    The layout of the figure is computed already, as `style.settle` leaves it.
+
     Guide lines, whose names begin with "_", may be crossed, and labels with a ground of their own
     may lie on anything.
     """
-    figure.draw_without_rendering()
     drawn = [(name, points) for ax in figure.axes for name, points in _points(ax)]
     found = []
     labels = [(text.get_text(), box) for ax in figure.axes for text, box in _labels(ax)]
@@ -53,9 +54,11 @@ def _points(ax: Axes) -> list[tuple[str, np.ndarray]]:
             places = np.ma.filled(np.ma.asarray(cloud.get_offsets(), float), np.nan)
             found.append((cloud.get_label(), cloud.get_offset_transform().transform(places)))
     box = ax.bbox.padded(1.0)
-    inside = [(name, points[np.isfinite(points).all(axis=1)]) for name, points in found]
-    return [(name, points[[box.contains(*point) for point in points]]) for name, points in inside
-            if len(points)]  # fmt: skip
+    visible = [
+        (name, points[((box.min <= points) & (points <= box.max)).all(axis=1)])
+        for name, points in found
+    ]
+    return [(name, points) for name, points in visible if len(points)]
 
 
 def _between(start: np.ndarray, end: np.ndarray) -> np.ndarray:
