@@ -14,7 +14,8 @@ from matplotlib.transforms import Bbox
 def collisions(figure: Figure) -> list[tuple[str, str]]:
     """Return labels that lie on points or curves, with these, and labels that lie on labels.
 
-    The layout of the figure is computed already, as `style.settle` leaves it.
+    They are where the figure was drawn last, which must have been at its own resolution, as by
+    `style.settle`.
 
     Guide lines, whose names begin with "_", may be crossed, and labels with a ground of their own
     may lie on anything.
@@ -29,8 +30,9 @@ def collisions(figure: Figure) -> list[tuple[str, str]]:
 
 
 def _labels(ax: Axes) -> list[tuple[Text, Bbox]]:
-    """Texts in and beside a panel, and the boxes of their letters."""
-    texts = [*ax.texts, *(ax.get_legend().get_texts() if ax.get_legend() else ())]
+    """Titles and texts in and beside a panel, and the boxes of their letters."""
+    titles = (ax.title, ax._left_title, ax._right_title)
+    texts = [*titles, *ax.texts, *(ax.get_legend().get_texts() if ax.get_legend() else ())]
     shown = [text for text in texts if text.get_text().strip() and text.get_bbox_patch() is None]
     # Boxes are as high as the font; letters are not.
     return [(text, Text.get_window_extent(text).padded(-1.5)) for text in shown]

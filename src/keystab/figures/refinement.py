@@ -31,7 +31,7 @@ TABLES = {
 
 QUANTITIES = {
     "lost": ("true ones lost", "true extrema lost (%)"),
-    "kept": ("false ones among the kept", "false among the kept (%)"),
+    "kept": ("false ones kept", "false among the kept (%)"),
     "removed": ("false ones removed", "false extrema removed (%)"),
 }
 """Title and axis of the columns of panels."""
