@@ -75,15 +75,21 @@ def said(expression: str) -> str:
     >>> said("most_all <= 1.1 * least_all and seen_in_all_views < 1")
     'most all ≤ 1.1 × least all and seen in all views < 1'
     """
-    text = _WORD.sub(lambda found: words(found[0]), expression)
-    for sign, shown in _SIGNS.items():
-        text = text.replace(sign, shown)
-    return text.replace(" - ", " − ")
+    return _signs(_WORD.sub(lambda found: words(found[0]), expression))
 
 
 def _column(expression: str) -> str:
     """Columns in words; several in a formula stay readable as one."""
-    text = _WORD.sub(lambda found: COLUMNS.get(found[0], words(found[0])), expression)
+    return _signs(_WORD.sub(lambda found: _column_words(found[0]), expression))
+
+
+def _column_words(name: str) -> str:
+    if name in COLUMNS:
+        return COLUMNS[name]
+    return f"number of {words(name[2:])}" if name.startswith("n_") else words(name)
+
+
+def _signs(text: str) -> str:
     for sign, shown in _SIGNS.items():
         text = text.replace(sign, shown)
     return text.replace(" - ", " − ")
@@ -103,7 +109,7 @@ def origin(quantity: Quantity) -> str:
     if quantity.expression:
         return said(quantity.expression)
     take, _, by = quantity.take.partition(" ")
-    column, by = _column(quantity.column), COLUMNS.get(by, words(by))
+    column, by = _column(quantity.column), _column_words(by)
     if by:
         kinds = {
             "argmax": f"{by} of the largest {column}",
