@@ -7,6 +7,7 @@ import figure_tables
 import matplotlib
 import numpy as np
 import pytest
+from figure_labels import collisions
 from PIL import Image
 
 from keystab import __version__
@@ -92,11 +93,12 @@ def rim_is_white(pixels):
 
 
 @pytest.mark.parametrize("n", NUMBERS)
-def test_text_has_seven_points_or_more_and_nothing_touches_the_edge(n, drawn):
+def test_text_has_seven_points_and_touches_neither_edge_nor_points_nor_curves(n, drawn):
     texts = [text for text in drawn[n].findobj(matplotlib.text.Text) if text.get_text().strip()]
     assert len(texts) > 4
     assert min(text.get_fontsize() for text in texts) >= 7.0
     assert rim_is_white(pixels(drawn[n]))
+    assert collisions(drawn[n]) == []  # where labels are as the figure was drawn last
 
 
 @pytest.mark.parametrize(
@@ -126,6 +128,17 @@ def test_panels_carry_their_letters(n, letters, drawn):
     titles = {ax.get_label(): ax.get_title(loc="left") for ax in drawn[n].axes}
     for name in letters:
         assert titles[name].startswith(rf"$\bf{{({name})}}$")
+
+
+def test_dashed_means_the_coarse_sampling_in_every_figure(drawn):
+    dashed = {
+        (n, line.get_label().split(",")[0])
+        for n in NUMBERS
+        for ax in drawn[n].axes
+        for line in ax.get_lines()
+        if line.get_linestyle() not in ("-", ":", "None")
+    }
+    assert dashed == {(8, "3"), ("S1", "3"), ("S5", "3")}
 
 
 @pytest.mark.parametrize("n", [5, 6])

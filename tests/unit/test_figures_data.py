@@ -195,10 +195,10 @@ def test_figure_5_draws_shares_and_roc():
             assert_array_equal(share, 100 * rows[f"{group}_below"])
         curve = np.array(line(panel(figure, "e"), feature))
         rows = tables["fig5_roc"].query("feature == @feature")
-        expected = rows[["specificity", "sensitivity"]].to_numpy().T
+        expected = 100 * rows[["specificity", "sensitivity"]].to_numpy().T
         order = np.lexsort((-expected[1], expected[0]))
         assert_array_equal(curve, expected[:, order])
-    assert_array_equal(line(panel(figure, "e"), "chance"), [[0, 1], [1, 0]])
+    assert_array_equal(line(panel(figure, "e"), "chance"), [[0, 100], [100, 0]])
 
 
 def test_figure_5_lists_the_areas_best_first():

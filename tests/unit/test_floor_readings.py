@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
+from figure_labels import collisions
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.colors import to_rgba
 
 from keystab.evaluation.stability import new_and_lost
 from keystab.experiments.change_causes import CAUSES, causes_of_changes
@@ -20,6 +24,8 @@ from keystab.experiments.floor_readings import (
     reading_table,
 )
 from keystab.experiments.sampling_stability import floor_summary, keypoints_of_samplings
+from keystab.figures import floor
+from keystab.figures._render import read_tables
 from keystab.matching.correspondence import one_to_one, pairs_between, pairs_within
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
@@ -236,3 +242,20 @@ def test_each_cause_is_recognised():
     assert new["any", "edge"] == new["any", "false"] == 1
     row = causes[(causes["change"] == "new") & (causes["cause"] == "false")].iloc[0]
     assert row["rate"] == 1 / 8 and row["low"] < row["rate"] < row["high"]
+
+
+@pytest.mark.slow
+def test_the_figure_has_a_mark_for_each_reading_and_no_label_on_any():
+    folder = Path(__file__).parents[2] / "results/reference/tables"
+    tables = read_tables(folder, floor.TABLES)
+    figure = floor.draw(tables)
+    panels = {ax.get_label(): ax for ax in figure.axes}
+    assert set(panels) == {*"abcdefgh", "causes"}
+    marks = [len(cloud.get_offsets()) for cloud in panels["a"].collections]
+    own = floor._own(tables["floor_readings"])
+    assert sum(marks) == len(own) + own["reaches"].sum()  # these have a ring as well
+    assert collisions(figure) == []
+    # What no extremum causes has its colour in the bars and in the list below them.
+    colour = to_rgba(floor.palette.CHANGE_CAUSE_COLOURS["false"])
+    listed = {patch.get_facecolor() for patch in panels["causes"].get_legend().get_patches()}
+    assert colour in listed and colour in {bar.get_facecolor() for bar in panels["d"].patches}

@@ -6,6 +6,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
+from figure_labels import collisions
 
 from keystab.errors import InputError
 from keystab.figures import predictors, style
@@ -39,6 +40,7 @@ def test_all_areas_and_curves_are_drawn(tables, tmp_path):
     figure = predictors.draw(tables)
     panels = {ax.get_label(): ax for ax in figure.axes}
     assert set(panels) == set("abcdef")
+    assert collisions(figure) == []
     auc = tables["predictors_auc"]
     lines = {line.get_label(): line for line in panels["c"].lines}
     for picture in PICTURES:

@@ -19,11 +19,13 @@ NAMES = [
     "interrupted",
     "overheads",
     "reference_pages",
+    "report",
+    "report_words",
     "rule_graph",
     "study",
     "study_end",
+    "tutorial",
 ]
-NAMES += ["tutorial"]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -8,10 +8,11 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
+from figure_labels import collisions
 
 from keystab.errors import InputError
 from keystab.evaluation.recall_precision import CAUSES
-from keystab.figures import refinement, style, truth
+from keystab.figures import refinement, style, truth, truth_cameras
 from keystab.figures._render import save
 
 BOTH = ("discrete", "refined")
@@ -46,7 +47,7 @@ def truth_tables():
     causes["n_group"] = 20
     auc = labelled(label=["stability", "truth"], feature=list(style.FEATURE_NAMES))
     auc = auc.assign(auc=0.8, low=0.7, high=0.9)
-    views = labelled(sweep=list(truth.SWEEPS), value=[0.1, 0.4], n_spo=[9], detections=BOTH)
+    views = labelled(sweep=list(truth_cameras.SWEEPS), value=[0.1, 0.4], n_spo=[9], detections=BOTH)
     views = views.assign(**shares(12))
     return {
         "truth_samplings": samplings,
@@ -76,7 +77,8 @@ def choices():
 def test_figure_truth_shows_its_tables(truth_tables, tmp_path):
     figure = truth.draw(truth_tables)
     panels = {ax.get_label(): ax for ax in figure.axes}
-    assert set(panels) == set("abcdefghijk")
+    assert set(panels) == set("abcdefgh")
+    assert collisions(figure) == []
     rows = truth_tables["truth_samplings"]
     lines = {line.get_label(): line for line in panels["a"].lines}
     wanted = 100 * rows.loc[rows["detections"] == "refined", "recall"]
@@ -94,10 +96,25 @@ def test_figure_truth_shows_its_tables(truth_tables, tmp_path):
     assert (tmp_path / "one.pdf").read_bytes() == (tmp_path / "two.pdf").read_bytes()
 
 
+def test_figure_truth_cameras_shows_what_views_find_at_the_finest_sampling(truth_tables):
+    views = truth_tables["truth_views"]
+    coarse = views.assign(n_spo=3, recall=0.0)
+    figure = truth_cameras.draw({"truth_views": pd.concat([coarse, views])})
+    panels = {ax.get_label(): ax for ax in figure.axes}
+    assert set(panels) == set("abc")
+    assert collisions(figure) == []
+    for letter, sweep in zip("abc", truth_cameras.SWEEPS, strict=True):
+        rows = views[(views["sweep"] == sweep) & (views["detections"] == "refined")]
+        lines = {line.get_label(): line.get_ydata() for line in panels[letter].lines}
+        assert lines["recall"] == pytest.approx(100 * rows["recall"])
+        assert lines["precision"] == pytest.approx(100 * rows["precision"])
+
+
 def test_figure_refinement_shows_shares(choices):
     figure = refinement.draw(choices, draft=True)
     panels = {ax.get_label(): ax for ax in figure.axes}
     assert set(panels) == set("abcdef")
+    assert all(ax.get_title(loc="left").count("=") == 1 for ax in panels.values())  # n_spo
     lines = {line.get_label(): line for line in panels["a"].lines}
     assert lines["nearest True 0.6"].get_ydata() == pytest.approx(
         [100 * n / 70 for n in (30, 15, 10, 0)]

@@ -23,7 +23,8 @@ KAPPAS = {"match_kappas", "fig9"}
 BLOBS = {"match_blobs", "figS4"}
 VARIANTS = {"match_variants", "floor"}
 MATCHING = SAMPLINGS | VIEWS | SWEEPS | KAPPAS | VARIANTS
-ACCEPTING = {"evaluate_samplings", "evaluate_cosine", "evaluate_kappas", "evaluate_views", "truth"}
+ACCEPTING = {"evaluate_samplings", "evaluate_cosine", "evaluate_kappas", "evaluate_views"}
+ACCEPTING |= {"truth", "truth_cameras"}
 EVALUATING = ACCEPTING | {
     "evaluate_grid",
     "evaluate_keypoints",
@@ -144,7 +145,7 @@ def test_other_criteria_give_verdicts_again_and_nothing_else(finished, name, old
         ("floor: {variants: {closer_1e6: {set: still}}}", VARIANTS),
         slow("floor: {limits: [0.3, 1.0]}", VARIANTS),
         ("floor: {pictures: {lake: {step: 20}}}", VARIANTS | {"simulate", "detect_variant"}),
-        ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "evaluate_views", "truth"}),
+        ("sets: {noise: {blur: 0.9}}", {"simulate", "detect_views", "match_sweep", "crop_views", "noise_theory", "fig12", "evaluate_views", "truth_cameras"}),
         slow("sets: {blur_errors: {blur: [0.7, 1.1]}}", {"simulate", "detect_views", "match_blurs", "figS2"}),
         slow("comparison: {stable_above: 0.9}", {"match_samplings"} | AFTER_MATCHING),
         ("predictors: {block: 25.0}", PREDICTING),

@@ -1,4 +1,5 @@
-"""What a detector should find, and what it finds of it (figures truth, refinement, uncertainty).
+"""What a detector should find, and what it finds of it (figures truth, truth_cameras, refinement,
+uncertainty).
 
 Comes in: views, tables of extrema and refinement traces. Goes out: truth/*.parquet, the true extrema
 of the view and of the scene, and tables/truth_*.csv, refinement_choices.csv, uncertainty_*.csv.

@@ -1,4 +1,4 @@
-"""What sets of views could see of the true extrema of a scene (figure truth)."""
+"""What sets of views could see of the true extrema of a scene (figure truth_cameras)."""
 
 from __future__ import annotations
 

@@ -26,8 +26,8 @@ PRECISION = ("n_spo", "detections", "quantity", "mean", "median", "low", "high")
 """Columns of the tables of precision."""
 
 QUANTITIES = {
-    "location": ("precision of location", "precision (px)"),
-    "log2_sigma": ("precision of scale", "precision (octaves)"),
+    "location": ("precision of location", "spread (px)"),
+    "log2_sigma": ("precision of scale", "spread (octaves)"),
 }
 """Title and vertical axis of the panel of each precision."""
 
@@ -154,8 +154,8 @@ def curve_axes(ax: Axes) -> None:
     """Set limits, ticks and names of the axes of a panel of stability curves."""
     ax.set(xlim=(0, 100), ylim=(0, 102))
     ax.set(xticks=np.arange(0, 101, 25), yticks=np.arange(0, 101, 25))
-    ax.set_xlabel("seen in at least this share of the views (%)")
-    ax.set_ylabel("unique keypoints (%)")
+    ax.set_xlabel(style.VIEWS_AXIS)
+    ax.set_ylabel(style.UNIQUE_AXIS)
     style.finish_axes(ax)
 
 
@@ -171,7 +171,7 @@ def precision(ax: Axes, table: DataFrame, quantity: str, medians: bool = False) 
     quantity : str
         A key of `QUANTITIES`.
     medians : bool
-        Draw medians as thin dashed lines, where they are above 0.
+        Draw medians as thin lines, where they are above 0.
     """
     table = table[table["quantity"] == quantity]
     lowest, highest = np.inf, 0.0
@@ -184,7 +184,7 @@ def precision(ax: Axes, table: DataFrame, quantity: str, medians: bool = False) 
         ax.plot(n_spo, mean, "o-", color=colour, label=detections, markersize=2.6, linewidth=1.2)
         if medians:
             median = rows["median"].to_numpy(dtype=np.float64)
-            ax.plot(n_spo, median, "--", color=colour, label=f"{detections}, median", linewidth=0.8)
+            ax.plot(n_spo, median, color=colour, label=f"{detections}, median", linewidth=0.6)
             lower = np.fmin(lower, median)
         if len(rows):
             # The name stands above its curve; below the lower one, unless its median is there.
@@ -203,7 +203,7 @@ def precision(ax: Axes, table: DataFrame, quantity: str, medians: bool = False) 
         raise InputError(f"there is no {quantity} above 0 to draw; remake the tables of precision")
     if medians:
         place = {"transform": ax.transAxes, "color": palette.GREY, "fontsize": style.SMALL}
-        ax.text(0.04, 0.03, "dashed: median", **place)
+        ax.text(0.04, 0.03, "thin: median", **place)
     style.log_y_axis(ax, (0.8 if medians else 0.55) * lowest, 1.6 * highest)
     ax.set_ylabel(QUANTITIES[quantity][1])
     style.sampling_axis(ax, table["n_spo"])
@@ -241,13 +241,12 @@ def views_figure(curves: DataFrame, table: DataFrame, draft: bool = False) -> Fi
             for detections, colour in palette.DETECTION_COLOURS.items():
                 rows = curves[(curves["n_spo"] == n_spo) & (curves["detections"] == detections)]
                 if len(rows):
-                    dashes = "-" if n_spo == finest else (0, (2.5, 1.2))
+                    dashes = "-" if n_spo == finest else style.COARSE
                     labels.append(
                         curve(stable, rows, colour, f"{n_spo}, {detections}", linestyle=dashes)
                     )
         for ax, name, quantity in ((place, "b", "location"), (scale, "c", "log2_sigma")):
             style.letter(ax, name, QUANTITIES[quantity][0])
             precision(ax, table, quantity, medians=quantity == "location")
-            ax.set_xlabel(style.N_SPO)
         end_labels({stable: labels}, {stable: (style.N_SPO, "seen in all")})
         return style.settle(figure, draft)

@@ -70,8 +70,8 @@ def draw_curves(
         ends[f"{value:g}"] = (float(rows["percentage_of_unique"].iloc[-1]), colour)
     ax.set(xlim=(0.0, 100.0), ylim=(0.0, 102.0))
     ax.set(xticks=range(0, 101, 25), yticks=range(0, 101, 25))
-    ax.set_xlabel("views that see it, at least (%)")
-    ax.set_ylabel("unique keypoints (%)")
+    ax.set_xlabel(style.VIEWS_AXIS)
+    ax.set_ylabel(style.UNIQUE_AXIS)
     style.finish_axes(ax)
     label_ends(ax, ends, symbol, gap)
 
@@ -161,7 +161,7 @@ def draw_band(ax: Axes, x: ArrayLike, low: ArrayLike, high: ArrayLike, colour: A
 
 
 def label_ends(
-    ax: Axes, ends: Mapping[str, tuple[float, Any]], symbol: str, gap: float = 0.08
+    ax: Axes, ends: Mapping[str, tuple[float, Any]], symbol: str = "", gap: float = 0.08
 ) -> None:
     """Write the name of each line to the right of the panel, where the line ends or near it.
 
@@ -172,7 +172,7 @@ def label_ends(
     ends : mapping
         Name -> height at which the line ends, in data coordinates, and colour.
     symbol : str
-        What the names are values of; written above the highest.
+        What the names are values of; written above the highest. Nothing where they say it.
     gap : float
         Least distance of two names, as a share of the panel's height.
     """
@@ -182,8 +182,8 @@ def label_ends(
     to_share = ax.transScale + ax.transLimits
     x = ax.get_xlim()[1]
     heights = [to_share.transform((x, height))[1] for height, _ in known.values()]
-    # One more on top, for the symbol.
-    places = style.spread([*heights, max(heights) + gap], gap, 0.0, 1.0)
+    top = [max(heights) + gap] if symbol else []
+    places = style.spread([*heights, *top], gap, 0.0, 1.0)
     text: dict[str, Any] = {"fontsize": style.SMALL, "va": "center", "ha": "left"}
     for (name, (_, colour)), height, place in zip(known.items(), heights, places, strict=False):
         ax.annotate(
@@ -203,4 +203,5 @@ def label_ends(
             },
             **text,
         )
-    ax.text(1.05, places[-1], symbol, transform=ax.transAxes, **text)
+    if symbol:
+        ax.text(1.05, places[-1], symbol, transform=ax.transAxes, **text)

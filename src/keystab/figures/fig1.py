@@ -96,12 +96,14 @@ def _draw_added_blur(ax: Axes, rows: DataFrame, colour: str) -> None:
     sigma, c = rows["sigma"].to_numpy(), float(rows["c"].iloc[0])
     lines: dict[str, dict[str, Any]] = {
         "theory": {"color": palette.PALE, "linewidth": 5.0},
-        "single_blur": {"color": palette.INK, "linewidth": 0.9, "linestyle": (0, (4, 2))},
-        "repeated_blur": {"color": colour, "linewidth": 1.7},
+        "repeated_blur": {"color": colour, "linewidth": 2.2},
+        "single_blur": {"color": palette.INK, "linewidth": 0.7},
     }
     for depth, (column, options) in enumerate(lines.items()):
         ax.plot(sigma, _added(rows[column], c), label=column, zorder=2 + depth, **options)
-    ax.axvline(LIMIT, ymax=0.42, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=1)
+    ax.axvline(
+        LIMIT, ymax=0.42, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, zorder=1
+    )
     ax.set(xlim=(0.0, sigma[-1]), xticks=np.arange(0.0, sigma[-1] + 0.01, 0.5))
     ax.set_ylim(0.0, 1.03 * _added(rows["theory"], c).max())
     ax.set_xlabel(r"$\sigma$ of one pass (px)")
@@ -143,7 +145,7 @@ def _draw_by_method(
         ax.plot(sigma, values, color=colour, label=method)
         name, above = style.METHOD_NAMES[method], method not in below
         style.direct_label(ax, sigma[-1], values[-1], name, colour, up=8.0 if above else -8.0)
-    ax.axvline(LIMIT, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=1)
+    ax.axvline(LIMIT, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, zorder=1)
     ax.set_yscale("log")
     ax.margins(y=0.1)
     ax.set(xlim=(0.0, sigma[-1]), xticks=np.arange(0.0, sigma[-1] + 0.01, 0.5))

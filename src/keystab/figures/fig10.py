@@ -70,7 +70,7 @@ def _draw_counts(ax: Axes, counts: DataFrame, colours: Colours) -> None:
     ax.scatter(blur, mean, s=14, c=list(colours.values()), zorder=3)
     ax.set_xlim(0.0, 1.06 * blur[-1])
     ax.set_ylim(0.0, 1.15 * np.nanmax([*ends[1], *mean, 1.0]))
-    ax.set_xlabel("camera blur $c$ (px)")
+    ax.set_xlabel(style.BLUR_AXIS)
     ax.set_ylabel("keypoints per view")
     style.finish_axes(ax)
 

@@ -101,7 +101,6 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         )
         style.letter(stability, "a", "stability under noise")
         draw_curves(stability, curves, "noise", colours, colours, SYMBOL, 0.1)
-        stability.set_xlabel("views, at least (%)")
         _draw_crops(crops, tables["fig12_pixels"], drawn[:: -(-len(drawn) // 4)], colours)
         _draw_counts(above, scales, colours)
         style.letter(seen, "d", "stability against scale")
@@ -147,7 +146,7 @@ def _is(values: Any, wanted: float) -> Any:
 
 def _draw_crops(ax: Axes, pixels: DataFrame, noises: Sequence[float], colours: Colours) -> None:
     """Draw one crop per noise, two a row, on the grey scale of the picture."""
-    style.letter(ax, "b", "crops of views")
+    style.letter(ax, "b", style.NOISE_AXIS)
     crops = [_crop(pixels[pixels["noise"] == noise], noise) for noise in noises]
     height, width = (max(crop.shape[axis] for crop in crops) for axis in (0, 1))
     for number, (noise, crop) in enumerate(zip(noises, crops, strict=True)):
@@ -205,7 +204,14 @@ def _plain_numbers(ax: Axes) -> None:
 def _draw_rule(ax: Axes, comparisons: Sequence[Comparison], colours: Colours) -> None:
     """Draw the second octave at a noise against the first at half of it, and their equality."""
     style.letter(ax, "e", "one octave = half the noise?")
-    ax.plot([0, 100], [0, 100], color=palette.GREY, linewidth=0.7, linestyle=":", label="equal")
+    ax.plot(
+        [0, 100],
+        [0, 100],
+        color=palette.GREY,
+        linewidth=0.7,
+        linestyle=style.REFERENCE,
+        label="equal",
+    )
     style.direct_label(ax, 60, 60, "equal", palette.GREY, right=8.0, up=-4.0, ha="left")
     for noise, half, whole in comparisons:
         colour = colours.get(noise, palette.INK)
@@ -237,7 +243,7 @@ def _draw_ratio(ax: Axes, theory: DataFrame) -> None:
     colour = palette.THEORY_COLOURS["blob"]
     ax.plot(sigma, ratio, color=colour, label="octave_ratio")
     style.direct_label(ax, sigma[0], ratio[0], "closed form", colour, right=8.0, up=-3.0, ha="left")
-    ax.axhline(PAPERS_RATIO, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=1)
+    ax.axhline(PAPERS_RATIO, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, zorder=1)
     text = f"in the paper: {PAPERS_RATIO:g}"
     style.direct_label(ax, sigma[0], PAPERS_RATIO, text, palette.GREY, 4.0, -6.0, ha="left")
     n_octaves = np.floor(np.log2(sigma[-1] / sigma[0]) + 1e-9)

@@ -131,7 +131,7 @@ def _heat_map(ax: Axes, grid: DataFrame, column: str, colours: Colormap, norm: N
     ax.set_xticks(np.arange(len(cells.columns)) + 0.5, [str(n_spo) for n_spo in cells.columns])
     ax.tick_params(length=0, pad=3)
     ax.spines[:].set_visible(False)
-    ax.set(xlabel=f"{style.N_SPO} (scales per octave)", ylabel=f"{style.DELTA_MIN} (px)")
+    ax.set(xlabel=style.N_SPO_AXIS, ylabel=f"{style.DELTA_MIN} (px)")
     return image
 
 

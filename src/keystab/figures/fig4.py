@@ -130,7 +130,7 @@ def _draw_counts(ax: Axes, counts: DataFrame) -> None:
 
 def _draw_rates(ax: Axes, counts: DataFrame) -> None:
     """Draw the rates of new and lost detections with their 95 % bands."""
-    style.letter(ax, "b", "new and lost detections")
+    style.letter(ax, "b", "new and lost extrema")
     n_spo = counts["n_spo"].to_numpy()
     meaning = {"new": "new: not at the next coarser one", "lost": "lost: not at the next finer one"}
     for line, (change, text) in enumerate(meaning.items()):
@@ -143,12 +143,12 @@ def _draw_rates(ax: Axes, counts: DataFrame) -> None:
         ax.plot(n_spo, rate, "o-", color=colour, markerfacecolor=face, label=change)
         place = {"transform": ax.transAxes, "ha": "right", "va": "top"}
         ax.text(1.0, 0.98 - 0.1 * line, text, color=colour, fontsize=style.SMALL, **place)
-    ax.axhline(FLOOR, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=1)
+    ax.axhline(FLOOR, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, zorder=1)
     text = f"floor in the paper: {FLOOR:g} %"
     style.direct_label(ax, n_spo[-1], FLOOR, text, palette.GREY, up=5.0)
     highest = 100 * np.nanmax(counts[["new_high", "lost_high"]].to_numpy(dtype=np.float64))
     ax.set_ylim(0.0, 1.2 * max(float(highest), FLOOR))  # leaves room for the text
-    ax.set_ylabel("share of detections (%)")
+    ax.set_ylabel(style.CHANGES_AXIS)
     style.sampling_axis(ax, n_spo)
     style.finish_axes(ax)
 
@@ -157,7 +157,7 @@ def _label_rows(ax: Axes, n_spo: NDArray[np.int64]) -> None:
     """Name some rows of an occurrence matrix by their sampling."""
     rows = np.arange(0, len(n_spo), -(-len(n_spo) // 5))
     ax.set_yticks(rows, [str(n) for n in n_spo[rows]])
-    ax.set_ylabel(style.N_SPO)
+    ax.set_ylabel(style.N_SPO_AXIS)
 
 
 if __name__ == "__main__":

@@ -54,8 +54,8 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     Returns
     -------
     matplotlib Figure
-        a to d: one feature each, logarithmic thresholds; e: sensitivity (stable keypoints kept)
-        against specificity (unstable ones removed), the features named in the order of their area.
+        a to d: one feature each, logarithmic thresholds; e: stable keypoints kept (sensitivity)
+        against unstable ones rejected (specificity), the features named in the order of their area.
 
     Raises
     ------
@@ -114,25 +114,32 @@ def _name_groups(ax: Axes, areas: DataFrame) -> None:
 
 def _draw_roc(ax: Axes, roc: DataFrame) -> None:
     """Draw the ROC curves and the diagonal of a feature that knows nothing."""
-    ax.plot([0, 1], [1, 0], color=palette.GREY, linewidth=0.7, linestyle=":", label="chance")
+    ax.plot(
+        [0, 100],
+        [100, 0],
+        color=palette.GREY,
+        linewidth=0.7,
+        linestyle=style.REFERENCE,
+        label="chance",
+    )
     for feature in PANELS:
         rows = _of(roc, feature).sort_values(
             ["specificity", "sensitivity"], ascending=[True, False]
         )
         colour = palette.FEATURE_COLOURS[feature]
-        ax.plot(rows["specificity"], rows["sensitivity"], color=colour, label=feature)
-    ax.set(xlim=(0, 1), ylim=(0, 1.02), aspect="equal", anchor="NE")
-    ticks = np.arange(0, 1.01, 0.25)
+        ax.plot(100 * rows["specificity"], 100 * rows["sensitivity"], color=colour, label=feature)
+    ax.set(xlim=(0, 100), ylim=(0, 102), aspect="equal", anchor="NE")
+    ticks = np.arange(0, 101, 25)
     ax.set(xticks=ticks, yticks=ticks)
-    ax.set_xlabel("specificity (unstable ones removed)")
-    ax.set_ylabel("sensitivity (stable ones kept)")
+    ax.set_xlabel("unstable ones rejected (%)")
+    ax.set_ylabel("stable ones kept (%)")
     style.finish_axes(ax)
 
 
 def _name_features(ax: Axes, areas: DataFrame) -> None:
     """List the features below the curves, best first, each in its colour with its area."""
     best_first = areas.loc[list(PANELS)].sort_values("auc", ascending=False)
-    lines = [("area under the curve (95 % interval)", palette.INK)]
+    lines = [(f"{style.AREA_AXIS} (95 %)", palette.INK)]
     for feature, row in best_first.iterrows():
         area = f"{row['auc']:.2f} ({row['low']:.2f} to {row['high']:.2f})"
         name = style.FEATURE_NAMES[str(feature)]

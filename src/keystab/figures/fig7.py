@@ -37,10 +37,6 @@ TABLES = {
 }
 """Files read, with the columns that they must have."""
 
-M_OFFSET = "$M_{\\mathrm{offset}}$"
-N_INTERP = "$N_{\\mathrm{interp}}$"
-"""The paper's symbols."""
-
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
     """Draw stability curves for all limits of the refinement, precision, counts, and SIFT's curves.
@@ -98,10 +94,10 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
             for ax, n_models in zip(grid[:, column], models, strict=True):
                 labels[ax] = _draw_choices(ax, here, n_models)
                 ax.set_label(name if ax is grid[0, column] else f"{name} {style.limit(n_models)}")
-        grid[len(models) // 2, 0].set_ylabel("unique keypoints (%)")
+        grid[len(models) // 2, 0].set_ylabel(style.UNIQUE_AXIS)
         for ax in grid[-1]:
-            ax.set_xlabel("seen in at least this share of the views (%)")
-        heads: dict[Axes, tuple[str, str]] = dict.fromkeys(grid[0], (M_OFFSET, "seen in all"))
+            ax.set_xlabel(style.VIEWS_AXIS)
+        heads: dict[Axes, tuple[str, str]] = dict.fromkeys(grid[0], (style.M_OFFSET, "seen in all"))
         precisions = style.panels(outer[1], 1, 2, wspace=0.03)[0]
         for ax, name, quantity in zip(precisions, "cd", QUANTITIES, strict=True):
             style.letter(ax, name, QUANTITIES[quantity][0])
@@ -121,9 +117,9 @@ def _draw_choices(ax: Axes, curves: DataFrame, n_models: float) -> list[EndLabel
     curve_axes(ax)
     ax.set(xlabel="", ylabel="")
     place = {"transform": ax.transAxes, "fontsize": style.SMALL}
-    ax.text(0.05, 0.07, f"{N_INTERP} = {style.limit(n_models)}", **place)
+    ax.text(0.05, 0.07, f"{style.N_INTERP} = {style.limit(n_models)}", **place)
     discrete = curves[curves["detections"] == "discrete"]
-    dots: dict[str, Any] = {"linestyle": (0, (1.0, 1.2)), "zorder": 4}
+    dots: dict[str, Any] = {"linestyle": style.REFERENCE, "zorder": 4}
     labels = [curve(ax, discrete, palette.DETECTION_COLOURS["discrete"], "discrete", **dots)]
     refined = curves[curves["max_iterations"] == n_models]
     for max_offset in sorted(refined["max_offset"].unique()):
@@ -148,7 +144,7 @@ def _draw_counts(ax: Axes, counts: DataFrame) -> list[EndLabel]:
         discrete = counts[here & (counts["detections"] == "discrete")]
         always = discrete["n_always"].iloc[0]
         label = f"{n_spo} discrete"
-        ax.plot(ends, (always, always), color=orange, linestyle=(0, (1.0, 1.2)), label=label)
+        ax.plot(ends, (always, always), color=orange, linestyle=style.REFERENCE, label=label)
         ax.text(sum(ends) / 2, 1.0, f"{style.N_SPO} = {n_spo}", **_above(ax))
         for row in refined[refined["n_spo"] == n_spo].to_dict("records"):
             shift = offsets.index(row["max_offset"]) - (len(offsets) - 1) / 2
@@ -164,7 +160,7 @@ def _draw_counts(ax: Axes, counts: DataFrame) -> list[EndLabel]:
     ax.set_xticks(ticks, [style.limit(n_models) for n_models in models] * len(blocks))
     ax.set_xlim(-0.7, ends[1] + 0.05)
     ax.set_ylim(0, 1.2 * counts["n_unique"].max())
-    ax.set(xlabel=N_INTERP, ylabel="unique keypoints")
+    ax.set(xlabel=style.N_INTERP_AXIS, ylabel="unique keypoints")
     style.finish_axes(ax)
     last = refined[(refined["n_spo"] == blocks[-1]) & (refined["max_iterations"] == models[-1])]
     return [

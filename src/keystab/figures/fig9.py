@@ -81,20 +81,6 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         return style.settle(figure, draft)
 
 
-def ratio_name(kappa: float) -> str:
-    """Write a ratio as the root of 2 that it is, or as a number where it is none.
-
-    Examples
-    --------
-    >>> ratio_name(2 ** (1 / 3)), ratio_name(1.3)
-    ('$2^{1/3}$', '1.3')
-    """
-    root = 1 / np.log2(kappa)
-    if abs(root - round(root)) < 1e-6:
-        return f"$2^{{1/{round(root)}}}$"
-    return f"{kappa:.4g}"
-
-
 def _draw_counts(ax: Axes, counts: DataFrame) -> None:
     """Draw the number of keypoints with each ratio."""
     style.letter(ax, "a", "number of keypoints")
@@ -113,9 +99,9 @@ def _draw_counts(ax: Axes, counts: DataFrame) -> None:
     kappas = counts["kappa"].to_numpy()
     nearest = {int(np.argmin(abs(octaves * n - 1))) for n in TICKS}
     rows = sorted(nearest)
-    ax.set_xticks(octaves[rows], [f"{ratio_name(k)}\n{k:.2f}" for k in kappas[rows]])
+    ax.set_xticks(octaves[rows], [f"{style.ratio_name(k)}\n{k:.2f}" for k in kappas[rows]])
     ax.minorticks_off()
-    ax.set_xlabel("ratio of the two blurs $\\kappa$")
+    ax.set_xlabel(style.KAPPA_AXIS)
     ax.set_ylabel("keypoints")
     style.finish_axes(ax)
 
@@ -123,8 +109,8 @@ def _draw_counts(ax: Axes, counts: DataFrame) -> None:
 def _label_rows(ax: Axes, kappas: NDArray[np.float64]) -> None:
     """Name some rows of the matrix by their ratio."""
     rows = np.arange(0, len(kappas), -(-len(kappas) // 8))
-    ax.set_yticks(rows, [ratio_name(kappa) for kappa in kappas[rows]])
-    ax.set_ylabel("$\\kappa$")
+    ax.set_yticks(rows, [style.ratio_name(kappa) for kappa in kappas[rows]])
+    ax.set_ylabel(style.KAPPA_AXIS)
 
 
 if __name__ == "__main__":

@@ -49,10 +49,13 @@ SHARES = {"found": "right keypoints found again", "right": "found ones that are 
 
 SHIFTS: dict[str, tuple[str, dict[str, Any]]] = {
     "scale": ("measured", {"color": palette.INK, "marker": "o", "markersize": 2.5}),
-    "blob": ("blob, closed form", {"color": palette.THEORY_COLOURS["blob"], "linestyle": "--"}),
+    "blob": (
+        "blob, closed form",
+        {"color": palette.THEORY_COLOURS["blob"], "linestyle": style.REFERENCE},
+    ),
     "dilation": (
         "mere dilation",
-        {"color": palette.THEORY_COLOURS["dilation"], "linestyle": ":"},
+        {"color": palette.THEORY_COLOURS["dilation"], "linestyle": style.REFERENCE},
     ),
 }
 """What the lines of the shifts are of, and how they look."""

@@ -85,7 +85,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
             _draw_blurs(above, _of(blurs, model))
             style.letter(below, lower, f"its spread at {_camera(profiles)}")
             _draw_profile(below, _of(profiles, model))
-        top[0].set_ylabel("camera blur $c$ (px)")
+        top[0].set_ylabel(style.BLUR_AXIS)
         bottom[0].set_ylabel("per square pixel")
         _name_pitches(top[0], _of(blurs, "diffraction"))
         _explain(top[1])

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from keystab.errors import InputError
 from keystab.figures import palette, style
 from keystab.figures._render import Tables, check_tables, main
+from keystab.figures._sweep_panels import label_ends
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,15 +80,16 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         style.letter(axes[0], "a", "scale found")
         _draw_operators(axes[0], parts["operator"])
         style.letter(axes[1], "b", "error of the scale found")
-        _draw_errors(axes[1], parts["sampling"], parts["operator"])
-        style.letter(axes[2], "c", "wrong camera blur")
+        ends = _draw_errors(axes[1], parts["sampling"], parts["operator"])
+        style.letter(axes[2], "c", "assumed camera blur")
         _draw_assumptions(axes[2], parts["assumed_blur"])
         for ax in axes:
-            ax.set_xlabel("blob before the camera, $s$ (px)")
+            ax.set_xlabel("size $s$ of the blob (px)")
             style.log_x_axis(ax, table["blob"].min(), table["blob"].max())
             ax.set_xlim(table["blob"].min() / 1.05, table["blob"].max() * 1.05)
             _plain_ticks(ax, table["blob"].min(), table["blob"].max())
             style.finish_axes(ax)
+        label_ends(axes[1], ends, style.N_SPO)
         return style.settle(figure, draft)
 
 
@@ -135,7 +137,14 @@ def _draw_operators(ax: Axes, rows: DataFrame) -> None:
         style.direct_label(ax, last, kappa**-0.5, name, colour, up=up)
     blob = np.geomspace(rows["blob"].min(), last, 50)
     first = rows["sigma_min"].iloc[0] / blob
-    ax.plot(blob, first, color=palette.GREY, linewidth=0.8, linestyle=":", label="first scale")
+    ax.plot(
+        blob,
+        first,
+        color=palette.GREY,
+        linewidth=0.8,
+        linestyle=style.REFERENCE,
+        label="first scale",
+    )
     low = min(kappa**-0.5 for kappa in kappas)
     ax.set_ylim(low - 0.09, 1.09)
     # Beside the curve, in the region where there is nothing.
@@ -147,52 +156,43 @@ def _draw_operators(ax: Axes, rows: DataFrame) -> None:
     ax.set_ylabel(r"detected $\sigma\,/\,s$")
 
 
-def _draw_errors(ax: Axes, samplings: DataFrame, operators: DataFrame) -> None:
-    """Draw the sizes of relative errors; the Laplacian is that of the exact series."""
+def _draw_errors(
+    ax: Axes, samplings: DataFrame, operators: DataFrame
+) -> dict[str, tuple[float, Any]]:
+    """Draw the sizes of relative errors; the Laplacian is that of the exact series.
+
+    Returns the height at which each line ends and its colour, for its name.
+    """
     from matplotlib.ticker import NullLocator
 
-    names = {"discrete": "on the grid", "refined": "refined"}
     finest = samplings["n_spo"].max()
-    groups = [
-        (
-            f"{names[detection]}, {style.N_SPO} = {n_spo}",
-            palette.DETECTION_COLOURS[detection],
-            n_spo,
-        )
-        for n_spo in sorted(set(samplings["n_spo"]))
-        for detection in names
-    ]
-    keys = [(d, n) for n in sorted(set(samplings["n_spo"])) for d in names]
+    ends = {}
+    for n_spo in sorted(set(samplings["n_spo"])):
+        for detection in ("discrete", "refined"):
+            own = samplings[(samplings["detection"] == detection) & (samplings["n_spo"] == n_spo)]
+            colour = palette.DETECTION_COLOURS[detection]
+            fill = colour if n_spo == finest else "white"
+            size = _draw_size(ax, own, colour, fill, f"{detection} {n_spo}")
+            ends[f"{n_spo}, {detection}"] = (size, colour)
     laplacian = operators[operators["operator"] == "laplacian"]
-    for (detection, n_spo), (name, colour, _) in zip(keys, groups, strict=True):
-        own = samplings[(samplings["detection"] == detection) & (samplings["n_spo"] == n_spo)]
-        fill = colour if n_spo == finest else "white"
-        _draw_size(ax, own, colour, fill, f"{detection} {n_spo}", name)
     colour = palette.OPERATOR_COLOURS["laplacian"]
-    _draw_size(ax, laplacian, colour, colour, "laplacian", "Laplacian, exact series")
+    ends["Laplacian"] = (_draw_size(ax, laplacian, colour, colour, "laplacian"), colour)
     ax.set_yscale("log")
-    ax.set_ylim(EXACT / 1.5, 100.0)  # room for the names
-    ax.set_yticks([1e-6, 1e-4, 1e-2])
+    ax.set_ylim(EXACT / 1.5, 1.0)
+    ax.set_yticks([1e-6, 1e-4, 1e-2, 1.0])
     ax.yaxis.set_minor_locator(NullLocator())
-    ax.legend(
-        loc="upper left",
-        bbox_to_anchor=(-0.01, 1.03),
-        frameon=False,
-        handlelength=1.4,
-        handletextpad=0.5,
-        labelspacing=0.2,
-        borderaxespad=0.1,
-    )
     ax.set_ylabel(r"|detected $\sigma$ / theory $-$ 1|")
+    return ends
 
 
-def _draw_size(ax: Axes, rows: DataFrame, colour: Any, fill: Any, label: str, name: str) -> None:
+def _draw_size(ax: Axes, rows: DataFrame, colour: Any, fill: Any, label: str) -> float:
+    """Draw the size of the errors of blobs; return that of the largest blob."""
     rows = rows.sort_values("blob")
     size = np.maximum(rows["error"].abs().to_numpy(), EXACT)
     size[rows["error"].isna()] = np.nan
     (line,) = ax.plot(rows["blob"], size, color=colour, **_marks(fill, 0.7, colour))
-    line.set_label(name)
     line.set_gid(label)
+    return float(size[-1])
 
 
 def _draw_assumptions(ax: Axes, rows: DataFrame) -> None:
@@ -204,7 +204,7 @@ def _draw_assumptions(ax: Axes, rows: DataFrame) -> None:
         side = "right" if assumed == c else "below" if assumed < c else "above"
         colour = palette.ASSUMED_COLOURS[side]
         theory = _over_right(blob, c, assumed)
-        ax.plot(blob, theory, color=colour, linewidth=0.8, linestyle=":", label="below")
+        ax.plot(blob, theory, color=colour, linewidth=0.8, linestyle=style.REFERENCE, label="below")
         reached = theory * blob / np.sqrt(kappa) >= rows["sigma_min"].iloc[0]
         label = f"theory {assumed:g}"
         ax.plot(blob[reached], theory[reached], color=colour, linewidth=1.0, label=label)
@@ -218,7 +218,7 @@ def _draw_assumptions(ax: Axes, rows: DataFrame) -> None:
             "above": ("> $c$", len(blob) // 3, -8.0),
         }[side]
         level = float(theory[at])
-        text = f"assumed {assumed:g} px ({relation})"
+        text = f"{assumed:g} px ({relation})"
         if np.isfinite(level):
             style.direct_label(ax, blob[at], level, text, colour, right=4.0, up=up, ha="left")
     seen = rows["detected"] * np.sqrt(kappa) / rows["blob"]

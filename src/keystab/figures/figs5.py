@@ -73,7 +73,7 @@ def _lines(table: DataFrame) -> list[tuple[DataFrame, str, object, str]]:
     for n_spo in sorted(table["n_spo"].unique()):
         for detections, colour in palette.DETECTION_COLOURS.items():
             rows = table[(table["n_spo"] == n_spo) & (table["detections"] == detections)]
-            dashes = "-" if n_spo == finest else (0, (2.5, 1.2))
+            dashes = "-" if n_spo == finest else style.COARSE
             if len(rows):
                 name = f"{n_spo}, {detections}"
                 found.append((rows.sort_values("tilt"), name, dashes, colour))
@@ -90,7 +90,7 @@ def _draw_shares(ax: Axes, table: DataFrame) -> list[EndLabel]:
         ax.plot(rows["tilt"], share, marker="o", markersize=2.6, **look)
         labels.append(EndLabel(float(share.iloc[-1]), name, "", colour))
     ax.set(ylim=(0, 102), yticks=range(0, 101, 25))
-    ax.set_ylabel("unique keypoints (%)")
+    ax.set_ylabel(style.UNIQUE_AXIS)
     _tilt_axis(ax, table)
     return labels
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from keystab.figures import palette, style
 from keystab.figures._render import Tables, check_tables, main
+from keystab.figures._sweep_panels import label_ends
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,25 +100,26 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     names = {str(name): str(words) for name, words in known if _is_described(str(name))}
     listed = _listed(readings)
     labels = [_words(row, listed.iloc[0]) for _, row in listed.iterrows()]
-    heights = (0.15 * _places(labels)[1] + 0.75, 1.75, 0.128 * len(summary) + 0.7)
+    heights = (0.15 * _places(labels)[1] + 1.0, 1.75, 0.2, 0.128 * len(summary) + 0.7)
     with style.context():
         figure = style.new_figure(sum(heights))
-        rows = figure.add_gridspec(3, 1, height_ratios=heights)
+        rows = figure.add_gridspec(4, 1, height_ratios=heights)
         first = rows[0].subgridspec(1, 3, width_ratios=(1.5, 0.8, 0.5), wspace=0.03)
         _draw_all(figure.add_subplot(first[0]), readings)
-        titles = ("one choice, and enough", "found at all")
+        titles = ("one choice, and enough", "always")
         panels = [figure.add_subplot(cell) for cell in (first[1], first[2])]
         _draw_rows(panels, "bc", titles, listed, labels)
         causes = style.panels(rows[1], 1, 2, sharey=True)[0]
         for ax, letter, matching in zip(causes, "de", MATCHING_NAMES, strict=True):
             style.letter(ax, letter, f"why, {MATCHING_NAMES[matching]}")
-            _draw_causes(ax, tables["floor_causes"], matching, named=letter == "d")
+            _draw_causes(ax, tables["floor_causes"], matching)
         causes[0].set_ylabel("lost (%)      new (%)")
-        third = rows[2].subgridspec(1, 3, width_ratios=(1.3, 0.8, 0.5), wspace=0.03)
+        _name_causes(figure.add_subplot(rows[2]))
+        third = rows[3].subgridspec(1, 3, width_ratios=(1.05, 0.85, 0.55), wspace=0.03)
         _draw_rates(figure.add_subplot(third[0]), tables["floor_rates"], names)
         panels = [figure.add_subplot(cell) for cell in (third[1], third[2])]
         labels = [names.get(name, name) for name in summary["variant"]]
-        titles = ("all variants", "found at all")
+        titles = ("all variants", "always")
         _draw_rows(panels, "gh", titles, summary, labels)
         return style.settle(figure, draft)
 
@@ -189,22 +191,32 @@ def _draw_all(ax: Axes, readings: DataFrame) -> None:
     ticks = (1, 2, 5, 10, 20, 50, 100)
     ax.set_xticks(ticks, [str(tick) for tick in ticks])
     ax.set_xlim(0.9 * LEAST, 1.2 * max(float(np.nan_to_num(rate).max()), 20.0))
-    style.direct_label(ax, RATE[0], ALWAYS[0], "paper", palette.GREY, up=-5.0)
-    ax.set_ylim(bottom=-2.0)
-    ax.set_xlabel("new and lost extrema, mean (%)")
-    ax.set_ylabel("keypoints found at all samplings (%)")
+    ax.set_xlabel(style.CHANGES_AXIS)
+    ax.set_ylabel(style.ALWAYS_AXIS)
     reach = readings[readings["reaches"]]
     ax.scatter(
         rate[reach.index], always[reach.index], s=60.0, facecolors="none",
         edgecolors=palette.CHANGE_COLOURS["lost"], linewidths=1.0, label="reaches",
     )  # fmt: skip
-    lines: list[tuple[str, Any]] = [(_tolerance(each), shades[each]) for each in tolerances]
-    signs = ("round: any", "square: one-to-one", "open: grid scale", "pale: soft range")
-    lines += [(sign, palette.INK) for sign in (*signs, f"size: {limits[0]:g} to {limits[-1]:g} px")]
-    for line, (text, colour) in enumerate(lines):
-        ax.text(0.99, 0.99 - 0.052 * line, text, color=colour, transform=ax.transAxes,
-                fontsize=style.SMALL, ha="right", va="top")  # fmt: skip
+    signs = ("round: any", "square: one-to-one", "open: grid scale", "pale: soft range",
+             f"size: {limits[0]:g} to {limits[-1]:g} px")  # fmt: skip
+    left: list[tuple[str, Any]] = [("grey: the paper", palette.GREY)]
+    left += [(_tolerance(each), shades[each]) for each in tolerances]
+    _list_above(ax, left, [(sign, palette.INK) for sign in signs], float(always.max()))
     style.finish_axes(ax)
+
+
+def _list_above(
+    ax: Axes, left: list[tuple[str, Any]], right: list[tuple[str, Any]], highest: float
+) -> None:
+    """Write two lists of names in their colours above all that is drawn."""
+    step, lines = 0.05, max(len(left), len(right))
+    ax.set_ylim(-2.0, (highest + 4.0) / (1.0 - step * lines))
+    ax.set_yticks([tick for tick in range(0, 101, 20) if tick <= highest + 4.0])
+    for names, x, side in ((left, 0.02, "left"), (right, 0.99, "right")):
+        for line, (text, colour) in enumerate(names):
+            ax.text(x, 0.99 - step * line, text, color=colour, transform=ax.transAxes,
+                    fontsize=style.SMALL, ha=side, va="top")  # fmt: skip
 
 
 def _draw_rows(
@@ -239,9 +251,9 @@ def _draw_rows(
     settled.set_xscale("log")
     settled.set_xticks([1, 10, 100], ["1", "10", "100"])
     settled.set_xlim(LEAST, 100.0)
-    settled.set_xlabel("new (full), lost (open) (%)")
+    settled.set_xlabel(f"{style.CHANGES_AXIS}\n(full: new, open: lost)")
     always.set_xlim(0.0, 100.0)
-    always.set_xlabel("keypoints (%)")
+    always.set_xlabel(style.ALWAYS_AXIS.replace(" samplings", "\nsamplings"))
 
 
 def _places(labels: list[str]) -> tuple[NDArray[np.float64], float]:
@@ -251,7 +263,7 @@ def _places(labels: list[str]) -> tuple[NDArray[np.float64], float]:
     return ends - lines / 2, float(ends[-1])
 
 
-def _draw_causes(ax: Axes, causes: DataFrame, matching: str, named: bool) -> None:
+def _draw_causes(ax: Axes, causes: DataFrame, matching: str) -> None:
     """Draw stacked bars per sampling, new extrema upwards and lost ones downwards."""
     own = causes[causes["matching"] == matching]
     samplings = np.unique(own["n_spo"])
@@ -267,24 +279,29 @@ def _draw_causes(ax: Axes, causes: DataFrame, matching: str, named: bool) -> Non
             base += height
     ax.axhline(0.0, color=palette.INK, linewidth=0.6)
     for value in (-10.0, 10.0):
-        ax.axhline(value, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=0)
+        ax.axhline(value, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, zorder=0)
     ax.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
-    if named:
-        place = {"transform": ax.transAxes, "fontsize": style.SMALL, "va": "center"}
-        place["bbox"] = {"facecolor": "white", "linewidth": 0, "pad": 0.5}  # over the paper's line
-        for line, (cause, name) in enumerate(CAUSE_NAMES.items()):
-            up, left = 0.96 - 0.085 * (line % 3), 0.36 if line < 3 else 0.70
-            colour = palette.CHANGE_CAUSE_COLOURS[cause]
-            ax.text(left, up, "\N{BLACK SQUARE}", color=colour, **place)
-            ax.text(left + 0.05, up, name, **place)
     style.sampling_axis(ax, samplings)
     style.finish_axes(ax)
+
+
+def _name_causes(ax: Axes) -> None:
+    """Say in a line of its own what the colours of the bars are."""
+    from matplotlib.patches import Patch
+
+    patches = [Patch(color=palette.CHANGE_CAUSE_COLOURS[cause], linewidth=0, label=name)
+               for cause, name in CAUSE_NAMES.items()]  # fmt: skip
+    ax.legend(handles=patches, loc="center", ncols=len(patches), frameon=False, borderpad=0.0,
+              handlelength=0.8, handleheight=0.8, handletextpad=0.4)  # fmt: skip
+    ax.set_label("causes")
+    ax.set_axis_off()
 
 
 def _draw_rates(ax: Axes, rates: DataFrame, names: Mapping[str, str]) -> None:
     """Draw the rates of new extrema against the sampling."""
     style.letter(ax, "f", "new extrema, by tolerance")
     shown = [name for name in DRAWN if (rates["variant"] == name).any()]
+    ends = {"the paper": (10.0, palette.GREY)}
     for name in shown:
         colour = palette.TOLERANCE_COLOURS[name]
         rows = rates[(rates["variant"] == name) & rates["new_rate"].notna()].sort_values("n_spo")
@@ -295,17 +312,15 @@ def _draw_rates(ax: Axes, rates: DataFrame, names: Mapping[str, str]) -> None:
         ax.fill_between(n_spo, low, high, color=colour, alpha=0.15, linewidth=0)
         ax.plot(n_spo, rate, "o-", color=colour, label=name)
         text = names.get(name, name).removeprefix("tolerance ").replace("no tolerance", "none")
-        up = {"epsilon_1e7": 4.0, "usual": -4.0}.get(name, 0.0)  # these two all but coincide
-        style.direct_label(ax, n_spo[-1], rate[-1], text, colour, right=5.0, up=up, ha="left")
-    ax.axhline(10.0, color=palette.GREY, linewidth=0.7, linestyle=":", zorder=1)
+        ends[text] = (float(rate[-1]), colour)
+    ax.axhline(10.0, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, zorder=1)
     ax.set_ylim(bottom=0.0)
     samplings = np.unique(rates["n_spo"])
-    end = samplings[-1] + 0.28 * (samplings[-1] - samplings[0])
-    ax.set_xlim(samplings[0] - 0.5, end)
-    style.direct_label(ax, end, 10.0, "paper", palette.GREY, up=-5.0, ha="right")
+    ax.set_xlim(samplings[0] - 0.5, samplings[-1] + 0.2)
     style.sampling_axis(ax, samplings)
     ax.set_ylabel("new extrema (%)")
     style.finish_axes(ax)
+    label_ends(ax, ends, "tolerance", 0.045)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,11 +26,11 @@ TABLES = {
 """Files read, with the columns that they must have."""
 
 PANELS = {
-    "stability": ("stable?", "stable", "unstable"),
-    "inside": ("stable, in range?", "stable", "unstable"),
-    "truth": ("true extremum?", "true", "false"),
+    "stability": ("stable?", "stable?", "stable", "unstable"),
+    "inside": ("stable, in range?", "in range?", "stable", "unstable"),
+    "truth": ("true extremum?", "true?", "true", "false"),
 }
-"""Question -> title of its column, what is good, what is bad."""
+"""Question -> title of its column, the same in short, what is good, what is bad."""
 
 NAMES = {
     **style.FEATURE_NAMES,
@@ -87,19 +87,19 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     }
     place = _places(auc)
     with style.context():
-        figure = style.new_figure(6.4)
+        figure = style.new_figure(6.9)
         outer = figure.add_gridspec(2, 1, height_ratios=(1.9, 1.0), hspace=0.03)
         upper = style.panels(outer[0], 1, len(PANELS), sharey=True, wspace=0.03)[0]
         lower = style.panels(outer[1], 1, len(PANELS), sharey=True, wspace=0.03)[0]
-        for column, (label, (title, good, bad)) in enumerate(PANELS.items()):
+        for column, (label, (title, short, good, bad)) in enumerate(PANELS.items()):
             style.letter(upper[column], "abc"[column], title)
             _draw_areas(upper[column], auc[auc["label"] == label], colours, place)
-            style.letter(lower[column], "def"[column], "pictures left out")
-            _draw_curves(lower[column], tables, label)
+            style.letter(lower[column], "def"[column], f"{short} pictures left out")
             lower[column].set_xlabel(f"{good} ones kept (%)")
+            _draw_curves(lower[column], tables, label)
             if column != 1:  # as in the first column
                 lower[column].set_ylabel(f"{bad} ones rejected (%)")
-        _name_pictures(upper[2], colours)
+        _name_pictures(figure, colours)
         _name_models(upper[0], place)
         return style.settle(figure, draft)
 
@@ -133,23 +133,31 @@ def _draw_areas(
             ax.text(1.09, height, f"{share.mean():.0f}", transform=ax.get_yaxis_transform(),
                     fontsize=style.SMALL, color=palette.INK, va="center", ha="right")  # fmt: skip
     head = {"transform": ax.transAxes, "fontsize": style.SMALL, "color": palette.GREY}
-    ax.text(1.1, 1.012, "rejected %", va="bottom", ha="right", **head)
-    ax.axvline(0.5, color=palette.GREY, linewidth=0.7, linestyle=":")
+    ax.text(1.1, 1.012, "rejected\n(%)", va="bottom", ha="right", **head)
+    ax.axvline(0.5, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE)
     ax.set_yticks(list(place.values()), [NAMES[name] for name in place])
     ax.set(
         xlim=(float(np.nanmin([0.4, table["auc"].min() - 0.02])), 1.0),
         ylim=(max(place.values()) + 0.6, -0.6),
     )
-    ax.set_xlabel("area under the ROC curve")
+    ax.set_xlabel(style.AREA_AXIS)
     style.finish_axes(ax)
 
 
-def _name_pictures(ax: Axes, colours: dict[str, str]) -> None:
-    """Write the names of the pictures, each in its colour, where the best predictors leave room."""
-    lines = [*colours.items(), ("open: its other blocks", palette.GREY)]
-    for line, (text, colour) in enumerate(reversed(lines)):
-        place = {"transform": ax.transAxes, "ha": "left", "va": "bottom"}
-        ax.text(0.2, 0.02 + 0.04 * line, text, color=colour, fontsize=style.SMALL, **place)
+def _name_pictures(figure: Figure, colours: dict[str, str]) -> None:
+    """Say above all panels which picture has which colour, and what full and open dots are."""
+    from matplotlib.lines import Line2D
+
+    dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.0}
+    dots = [Line2D([], [], color=colour, label=name, **dot) for name, colour in colours.items()]
+    learnt = {"learnt from other pictures": palette.GREY, "from its other blocks": "white"}
+    dots += [
+        Line2D([], [], color=palette.GREY, markerfacecolor=face, label=name, **dot)
+        for name, face in learnt.items()
+    ]
+    # As many columns as pictures leave two for what was learnt from where.
+    figure.legend(handles=dots, loc="outside upper right", ncols=min(len(dots), 6), frameon=False,
+                  handletextpad=0.1, columnspacing=1.2)  # fmt: skip
 
 
 def _name_models(ax: Axes, place: dict[str, float]) -> None:
@@ -186,9 +194,11 @@ def _draw_curves(ax: Axes, tables: Tables, label: str) -> None:
                             linewidth=0)  # fmt: skip
             ax.plot(kept, values.mean(axis=0), color=colour, label=name,
                     linewidth=width)  # fmt: skip
-        place = {"transform": ax.transAxes, "fontsize": style.SMALL, "color": colour}
-        ax.text(0.03, 0.04 + 0.1 * (2 - line), names[name], **place)
-    ax.plot([0, 100], [100, 0], ":", color=palette.GREY, linewidth=0.7, label="chance")
+        ax.annotate(
+            names[name], (0.0, 0.0), (0.0, -29.0 - 9.5 * line), xycoords="axes fraction",
+            textcoords="offset points", color=colour, fontsize=style.SMALL, va="top",
+        )  # fmt: skip
+    ax.plot([0, 100], [100, 0], style.REFERENCE, color=palette.GREY, linewidth=0.7, label="chance")
     ax.axvline(KEPT, color=palette.GREY, linewidth=0.5)
     ax.set(xlim=(0, 100), ylim=(0, 102))
     style.finish_axes(ax)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,18 +30,24 @@ TABLES = {
 """Files read, with the columns that they must have."""
 
 QUANTITIES = {
-    "lost": "true extrema lost (%)",
-    "kept": "of the kept, not true (%)",
-    "removed": "false ones removed (%)",
+    "lost": ("true ones lost", "true extrema lost (%)"),
+    "kept": ("false ones kept", "false among the kept (%)"),
+    "removed": ("false ones removed", "false extrema removed (%)"),
 }
-"""What the columns of panels show."""
+"""Title and axis of the columns of panels."""
 
-WAYS = {
-    ("nearest", True): {"linestyle": "-", "linewidth": 1.3},
-    ("nearest", False): {"linestyle": (0, (3, 1.5)), "linewidth": 1.0},
-    ("unit_step", True): {"linestyle": (0, (1, 1)), "linewidth": 1.3},
+WAYS: dict[tuple[str, bool], tuple[str, dict[str, Any]]] = {
+    ("nearest", True): ("to the nearest sample", {"linewidth": 1.6}),
+    ("nearest", False): (
+        "the same, scale fixed",
+        {"linewidth": 0.6, "marker": "o", "markersize": 3.2, "markerfacecolor": "white"},
+    ),
+    ("unit_step", True): (
+        "one step along each axis",
+        {"linewidth": 0.6, "marker": "x", "markersize": 3.2},
+    ),
 }
-"""Lines of the ways to move: by the nearest sample, in scale too or not, or by unit steps."""
+"""Ways to move (how, and in scale too or not): name, and look of the line."""
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
@@ -69,21 +75,22 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     shares = _shares(table)
     samplings = sorted(table["n_spo"].unique())
     with style.context():
-        figure = style.new_figure(1.95 * len(samplings) + 0.4)
+        figure = style.new_figure(1.95 * len(samplings) + 0.6)
         grid = style.panels(
             figure.add_gridspec(1, 1)[0], len(samplings), 3, hspace=0.03, wspace=0.03
         )
         for row, n_spo in enumerate(samplings):
             for column, quantity in enumerate(QUANTITIES):
                 ax = grid[row, column]
-                title = f"{style.N_SPO} = {n_spo}" if column == 0 else ""
+                title, axis = QUANTITIES[quantity]
+                title = f"{title}, {style.N_SPO} = {n_spo}"
                 style.letter(ax, "abcdef"[3 * row + column], title)
                 _draw_quantity(ax, shares[shares["n_spo"] == n_spo], quantity)
-                ax.set_ylabel(QUANTITIES[quantity])
+                ax.set_ylabel(axis)
                 if row == len(samplings) - 1:
-                    ax.set_xlabel("$N_{\\mathrm{interp}}$ (models at most)")
+                    ax.set_xlabel(style.N_INTERP_AXIS)
         _name_offsets(grid[0, 2], sorted(table["max_offset"].unique()))
-        _name_ways(grid[0, 1])
+        _name_ways(figure)
         return style.settle(figure, draft)
 
 
@@ -104,7 +111,7 @@ def _draw_quantity(ax: Axes, rows: DataFrame, quantity: str) -> None:
     most = rows["max_iterations"].max()
     finite = np.sort(rows["max_iterations"].unique())[:-1]
     place = {**{n: n for n in finite}, most: finite[-1] + 2}
-    for (move, scale_moves), line in WAYS.items():
+    for (move, scale_moves), (_, line) in WAYS.items():
         for max_offset in sorted(rows["max_offset"].unique()):
             here = rows[
                 (rows["move"] == move)
@@ -124,22 +131,18 @@ def _draw_quantity(ax: Axes, rows: DataFrame, quantity: str) -> None:
 def _name_offsets(ax: Axes, offsets: list[float]) -> None:
     """List the limits of the offset in their colours."""
     place = {"transform": ax.transAxes, "ha": "left", "va": "top", "fontsize": style.SMALL}
-    ax.text(1.02, 0.97, "$M_{\\mathrm{offset}}$", **place)
+    ax.text(1.02, 0.97, style.M_OFFSET, **place)
     for line, offset in enumerate(offsets, 1):
         colour = palette.offset_colour(offset)
         ax.text(1.02, 0.97 - 0.1 * line, style.limit(offset), color=colour, **place)
 
 
-def _name_ways(ax: Axes) -> None:
-    """Explain the lines."""
+def _name_ways(figure: Figure) -> None:
+    """Say above all panels how the next model is chosen."""
     from matplotlib.lines import Line2D
 
-    names = ("nearest sample", "the same, scale fixed", "unit steps")
-    lines = [
-        Line2D([], [], color=palette.INK, label=name, **line)
-        for name, line in zip(names, WAYS.values(), strict=True)
-    ]
-    ax.legend(handles=lines, loc="best", frameon=False, handlelength=2.2)
+    lines = [Line2D([], [], color=palette.INK, label=name, **look) for name, look in WAYS.values()]
+    figure.legend(handles=lines, loc="outside upper left", ncols=len(lines), frameon=False)
 
 
 if __name__ == "__main__":

@@ -42,7 +42,28 @@ FEATURE_NAMES = {
 
 N_SPO = "$n_{\\mathrm{spo}}$"
 DELTA_MIN = "$\\delta_{\\mathrm{min}}$"
+N_INTERP = "$N_{\\mathrm{interp}}$"
+M_OFFSET = "$M_{\\mathrm{offset}}$"
 """The paper's symbols."""
+
+N_SPO_AXIS = f"{N_SPO} (scales per octave)"
+N_INTERP_AXIS = f"{N_INTERP} (models at most)"
+BLUR_AXIS = "camera blur $c$ (px)"
+KAPPA_AXIS = "ratio of the two blurs $\\kappa$"
+NOISE_AXIS = "noise (grey range = 1)"
+VIEWS_AXIS = "views that see it, at least (%)"
+UNIQUE_AXIS = "unique keypoints (%)"
+CHANGES_AXIS = "new and lost extrema (%)"
+ALWAYS_AXIS = "found at all samplings (%)"
+AREA_AXIS = "area under the ROC curve"
+RIGHT_AXIS = "recall, precision (%)"
+"""Axes that several figures have: the same one has the same name everywhere."""
+
+COARSE: Any = (0, (2.5, 1.2))
+"""Dashed, in all figures: a coarse sampling beside a fine one."""
+
+REFERENCE = ":"
+"""Dotted, in all figures: what others are compared with, such as theory, the paper, chance."""
 
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -271,6 +292,20 @@ def limit(value: float) -> str:
     return "∞" if np.isinf(value) else f"{value:g}"
 
 
+def ratio_name(kappa: float) -> str:
+    """Write a ratio as the root of 2 that it is, or as a number where it is none.
+
+    Examples
+    --------
+    >>> ratio_name(2 ** (1 / 3)), ratio_name(1.3)
+    ('$2^{1/3}$', '1.3')
+    """
+    root = 1 / np.log2(kappa)
+    if abs(root - round(root)) < 1e-6:
+        return f"$2^{{1/{round(root)}}}$"
+    return f"{kappa:.4g}"
+
+
 def sampling_axis(ax: Axes, samplings: Iterable[int]) -> None:
     """Make the horizontal axis one of scales per octave, with a tick at every or every other one.
 
@@ -283,7 +318,7 @@ def sampling_axis(ax: Axes, samplings: Iterable[int]) -> None:
     """
     ticks = sorted({int(n_spo) for n_spo in samplings})
     ax.set_xticks(ticks[:: 1 if len(ticks) <= 10 else 2])
-    ax.set_xlabel(f"{N_SPO} (scales per octave)")
+    ax.set_xlabel(N_SPO_AXIS)
 
 
 def spread(

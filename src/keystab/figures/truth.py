@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from keystab.figures import palette, style
+from keystab.figures._recall_panels import SHARES, draw_recall_precision
 from keystab.figures._render import Tables, check_tables, main
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-SHARES = ("recall", "recall_low", "recall_high", "precision", "precision_low", "precision_high")
 ERRORS = ("median_location", "p90_location", "rms_location", "median_scale", "p90_scale")
 
 TABLES = {
@@ -28,7 +28,6 @@ TABLES = {
     "truth_kappas.csv": ("kappa", "detections", *SHARES),
     "truth_causes.csv": ("group", "cause", "share", "n_group"),
     "truth_auc.csv": ("label", "feature", "auc", "low", "high"),
-    "truth_views.csv": ("sweep", "value", "n_spo", "detections", *SHARES),
 }
 """Files read, with the columns that they must have."""
 
@@ -49,12 +48,12 @@ CAUSE_NAMES = {
 }
 """What a keypoint can be, in words."""
 
-SWEEPS = {
-    "aliasing": ("aliasing", "camera blur $c$ (px)"),
-    "unknown_blur": ("unknown blur", "spread of the blur, $\\Delta c$ (px)"),
-    "noise": ("noise", "noise $n$"),
+ERROR_LINES: dict[str, dict[str, Any]] = {
+    "median": {"linewidth": 1.5},
+    "p90": {"linewidth": 0.6},
+    "rms": {"linewidth": 0.6, "marker": "s", "markersize": 2.2},
 }
-"""Sweep -> title and axis of the panels i to k."""
+"""How the median of an error, what nine in ten stay below, and its root mean square are drawn."""
 
 
 def draw(tables: Tables, draft: bool = False) -> Figure:
@@ -71,8 +70,7 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     -------
     matplotlib Figure
         a, b: recall and precision against the sampling; c, d: errors; e: recall on the grid; f:
-        against the ratio of the two blurs; g: causes of instability; h: areas under ROC curves; i
-        to k: views against the scene.
+        against the ratio of the two blurs; g: causes of instability; h: areas under ROC curves.
 
     Raises
     ------
@@ -81,17 +79,12 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
     """
     check_tables(tables, TABLES)
     with style.context():
-        figure = style.new_figure(7.6)
-        outer = figure.add_gridspec(4, 1, height_ratios=(1, 1, 0.9, 1), hspace=0.03)
-        first, second, third, last = (
-            style.panels(outer[row], 1, columns, wspace=0.03, **more)[0]
-            for row, columns, more in (
-                (0, 3, {}),
-                (1, 3, {}),
-                (2, 2, {"width_ratios": (1.25, 1.0)}),
-                (3, 3, {}),
-            )
-        )
+        figure = style.new_figure(6.1)
+        outer = figure.add_gridspec(3, 1, height_ratios=(1, 1, 0.9), hspace=0.03)
+        first = style.panels(outer[0], 1, 3, wspace=0.03)[0]
+        # Numbers of three digits stand side by side in (e).
+        second = style.panels(outer[1], 1, 3, wspace=0.03, width_ratios=(0.85, 1.3, 0.85))[0]
+        third = style.panels(outer[2], 1, 2, wspace=0.03, width_ratios=(1.25, 1.0))[0]
         places = dict(zip(QUANTITIES, (*first, second[0]), strict=True))
         for (name, ax), letter in zip(places.items(), "abcd", strict=True):
             style.letter(ax, letter, QUANTITIES[name][0])
@@ -108,12 +101,33 @@ def draw(tables: Tables, draft: bool = False) -> Figure:
         _draw_causes(third[0], tables["truth_causes"])
         style.letter(third[1], "h", "what features predict")
         _draw_areas(third[1], tables["truth_auc"])
-        for ax, letter, (sweep, (title, axis)) in zip(last, "ijk", SWEEPS.items(), strict=True):
-            style.letter(ax, letter, title)
-            _draw_sweep(ax, tables["truth_views"], sweep)
-            ax.set_xlabel(axis)
-        last[0].set_ylabel("against the scene (%)")
+        _name_detections(figure)
         return style.settle(figure, draft)
+
+
+def _name_detections(figure: Figure) -> None:
+    """Say above all panels what colours and circles are, in (a) to (d)."""
+    from matplotlib.lines import Line2D
+
+    lines = [
+        Line2D([], [], color=colour, linewidth=1.5, label=f"{detections} extrema")
+        for detections, colour in palette.DETECTION_COLOURS.items()
+    ]
+    lines.append(
+        Line2D(
+            [],
+            [],
+            label="cosine series instead of the spline, (a) to (d)",
+            **_circles(palette.GREY),
+        )
+    )
+    figure.legend(handles=lines, loc="outside upper left", ncols=len(lines), frameon=False)
+
+
+def _circles(colour: str) -> dict[str, Any]:
+    """Look of what was found with the cosine series."""
+    return {"linestyle": "none", "marker": "o", "color": colour, "markerfacecolor": "none",
+            "markersize": 4.0}  # fmt: skip
 
 
 def _of(table: DataFrame, detections: str, by: str = "n_spo") -> DataFrame:
@@ -131,44 +145,41 @@ def _draw_share(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> No
         ax.plot(n_spo, 100 * share, "-", color=colour, label=detections, linewidth=1.2)
         if name == "precision":
             forgiven = (rows["n_right"] + rows["n_twin"]) / rows["n_detections"]
-            ax.plot(n_spo, 100 * forgiven, ":", color=colour, label=f"{detections}, with second")
+            ax.plot(
+                n_spo, 100 * forgiven, color=colour, label=f"{detections}, with second",
+                linewidth=0.6,
+            )  # fmt: skip
         other = _of(cosine, detections)
         ax.plot(
-            other["n_spo"], 100 * other[name], "o", color=colour, markerfacecolor="none",
-            markersize=4.0, label=f"{detections}, cosine",
-        )  # fmt: skip
+            other["n_spo"], 100 * other[name], label=f"{detections}, cosine", **_circles(colour)
+        )
     bottom = 100 * min(spline[f"{name}_low"].min(), cosine[name].min())
-    ax.set_ylim(bottom - 0.03 * (100 - bottom), 100 + 0.06 * (100 - bottom))
+    room = 0.2 if name == "precision" else 0.03  # for what thin lines mean
+    ax.set_ylim(bottom - room * (100 - bottom), 100 + 0.06 * (100 - bottom))
     if name == "precision":
-        names = [("dotted: second detections too", palette.GREY)]
-    else:
-        names = [*palette.DETECTION_COLOURS.items(), ("circles: cosine series", palette.GREY)]
-    _list(ax, names)
+        _say(ax, ["thin: second detections too"])
     style.sampling_axis(ax, spline["n_spo"])
     style.finish_axes(ax)
 
 
 def _draw_errors(ax: Axes, spline: DataFrame, cosine: DataFrame, name: str) -> None:
     """Draw quantiles of an error, and the root mean square in space, against the sampling."""
-    lines = [("median", "-"), ("p90", ":"), *([("rms", "-.")] if name == "location" else [])]
+    lines = {quantile: look for quantile, look in ERROR_LINES.items()
+             if f"{quantile}_{name}" in ERRORS}  # fmt: skip
     for detections, colour in palette.DETECTION_COLOURS.items():
         rows, other = _of(spline, detections), _of(cosine, detections)
-        for quantile, line in lines:
-            column = f"{quantile}_{name}"
-            ax.plot(rows["n_spo"], rows[column], line, color=colour, linewidth=1.2,
-                    label=f"{detections}, {quantile}")  # fmt: skip
-        ax.plot(
-            other["n_spo"], other[f"median_{name}"], "o", color=colour, markerfacecolor="none",
-            markersize=4.0, label=f"{detections}, cosine",
-        )  # fmt: skip
-    drawn = [spline[f"{quantile}_{name}"] for quantile, _ in lines]
+        for quantile, look in lines.items():
+            ax.plot(rows["n_spo"], rows[f"{quantile}_{name}"], color=colour,
+                    label=f"{detections}, {quantile}", **look)  # fmt: skip
+        ax.plot(other["n_spo"], other[f"median_{name}"], label=f"{detections}, cosine",
+                **_circles(colour))  # fmt: skip
+    drawn = [spline[f"{quantile}_{name}"] for quantile in lines]
     values = np.concatenate([*drawn, cosine[f"median_{name}"]])
     values = values[values > 0]
-    room = 5.0 if name == "location" else 2.5  # for what the lines mean
-    style.log_y_axis(ax, 0.6 * values.min(), room * values.max())
-    if name == "location":
-        words = ("solid: median, dotted: 90 %", "dash-dotted: r.m.s.")
-        _list(ax, [(each, palette.GREY) for each in words], top=True)
+    low, high = 0.6 * values.min(), 1.4 * values.max()
+    style.log_y_axis(ax, low, high * (high / low) ** 0.35)  # room for what the lines mean
+    words = ["thick: median, thin: 90 %", "squares: root mean square"]
+    _say(ax, words[: len(lines) - 1], top=True)
     style.sampling_axis(ax, spline["n_spo"])
     style.finish_axes(ax)
 
@@ -186,7 +197,7 @@ def _draw_grid(ax: Axes, grid: DataFrame) -> None:
                     fontsize=style.SMALL)  # fmt: skip
     ax.set_xticks(range(len(table.columns)), [f"{n}" for n in table.columns])
     ax.set_yticks(range(len(table.index)), [f"{d:g}" for d in table.index])
-    ax.set_xlabel(style.N_SPO)
+    ax.set_xlabel(style.N_SPO_AXIS)
     ax.set_ylabel(f"{style.DELTA_MIN} (px)")
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
@@ -196,24 +207,14 @@ def _draw_kappas(ax: Axes, table: DataFrame) -> None:
     """Draw recall and precision of refined keypoints against log2 kappa."""
     rows = _of(table, "refined", "kappa")
     place = np.log2(rows["kappa"].to_numpy())
-    colours = _share_colours()
-    for name in ("recall", "precision"):
-        low, high = 100 * rows[f"{name}_low"], 100 * rows[f"{name}_high"]
-        ax.fill_between(place, low, high, color=colours[name], alpha=0.15, linewidth=0)
-        ax.plot(place, 100 * rows[name], "o-", color=colours[name], label=name, linewidth=1.2)
     ax.set_xscale("log")
-    ax.set_xticks(place, [f"1/{1 / at:.3g}" for at in place])
-    ax.minorticks_off()
-    ax.set_xlabel("$\\log_2\\kappa$")
-    ax.set_ylabel("refined keypoints (%)")
+    if len(place) > 1:
+        ax.set_xlim(place[0], place[-1])
     bottom = 100 * np.nanmin(rows[["recall_low", "precision_low"]].to_numpy())
-    ax.set_ylim(bottom - 0.25 * (100 - bottom), 100 + 0.05 * (100 - bottom))
-    _list(ax, list(colours.items()))
-    style.finish_axes(ax)
-
-
-def _share_colours() -> dict[str, str]:
-    return {"recall": palette.CHANGE_COLOURS["new"], "precision": palette.CHANGE_COLOURS["lost"]}
+    draw_recall_precision(ax, place, rows, max(0.0, bottom - 0.1 * (100 - bottom)))
+    ax.set_xticks(place, [style.ratio_name(kappa) for kappa in rows["kappa"]])
+    ax.minorticks_off()
+    ax.set_xlabel(style.KAPPA_AXIS)
 
 
 def _draw_causes(ax: Axes, table: DataFrame) -> None:
@@ -258,32 +259,18 @@ def _draw_areas(ax: Axes, table: DataFrame) -> None:
         ax.hlines(place + up, rows["low"], rows["high"], color=palette.INK, linewidth=0.9)
         ax.plot(rows["auc"], place + up, "o", color=palette.INK, markerfacecolor=face, label=label,
                 markersize=4.0)  # fmt: skip
-    ax.axvline(0.5, color=palette.GREY, linewidth=0.7, linestyle=":")
+    ax.axvline(0.5, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE)
     ax.set_yticks(place, [style.FEATURE_NAMES[name] for name in features])
     ax.set(xlim=(0.4, 1.0), ylim=(len(features) - 0.5, -0.6))
-    ax.set_xlabel("area under the ROC curve\n(open: stability, full: truth)")
+    ax.set_xlabel(f"{style.AREA_AXIS}\n(open: stability, full: truth)")
     style.finish_axes(ax)
 
 
-def _draw_sweep(ax: Axes, table: DataFrame, sweep: str) -> None:
-    """Draw recall and precision of refined keypoints of views against the scene."""
-    rows = table[(table["sweep"] == sweep) & (table["detections"] == "refined")]
-    rows = rows[rows["n_spo"] == rows["n_spo"].max()].sort_values("value")
-    for name, colour in _share_colours().items():
-        low, high = 100 * rows[f"{name}_low"], 100 * rows[f"{name}_high"]
-        ax.fill_between(rows["value"], low, high, color=colour, alpha=0.15, linewidth=0)
-        ax.plot(rows["value"], 100 * rows[name], "o-", color=colour, label=name, linewidth=1.2)
-    ax.set_ylim(0, 103)
-    _list(ax, list(_share_colours().items()), top=sweep == "noise")
-    style.finish_axes(ax)
-
-
-def _list(ax: Axes, names: list[tuple[str, str]], top: bool = False) -> None:
-    """Write names in their colours in the lower right or the upper right corner."""
+def _say(ax: Axes, lines: list[str], top: bool = False) -> None:
+    """Write lines in the lower or the upper right corner, where the caller has left room."""
     place = {"transform": ax.transAxes, "ha": "right", "fontsize": style.SMALL}
-    for line, (name, colour) in enumerate(names):
-        height = 0.97 - 0.11 * line if top else 0.04 + 0.11 * (len(names) - 1 - line)
-        ax.text(0.98, height, name, color=colour, va="top" if top else "bottom", **place)
+    ax.text(0.99, 0.98 if top else 0.03, "\n".join(lines), color=palette.GREY,
+            va="top" if top else "bottom", **place)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -76,9 +76,6 @@ TASKS = {
 
 KNOWN, ALONE = ("shot", "shot"), ("estimated", "shot")
 
-DASHES = (0, (2.5, 1.2))
-"""Lines of what has its noise estimated, and of low survival left out."""
-
 _ASIDE = 1.045
 """Lines that hold as much stand beside each other by this factor of the noise."""
 
@@ -157,7 +154,7 @@ def _draw_levels(ax: Axes, rows: DataFrame) -> None:
     """Draw what ellipses hold beyond what they should, all noises together and their range."""
     position = rows[rows["quantity"] == "position"]
     levels = np.sort(position["level"].unique())
-    ax.axhline(0.0, color=palette.GREY, linewidth=0.7, linestyle=":")
+    ax.axhline(0.0, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE)
     for shift, (method, (_, colour)) in zip((-0.13, 0.0, 0.13), METHODS.items(), strict=True):
         own = position[position["method"] == method]
         beyond = 100 * (own["held"] - own["level"])
@@ -184,41 +181,41 @@ def _draw_cases(ax: Axes, rows: DataFrame, regions: str) -> None:
 
 
 def _draw_kinds(ax: Axes, rows: DataFrame) -> None:
-    """Draw what is held against noise by its kind; dashed where it is estimated."""
+    """Draw what is held against noise by its kind; open dots where it is estimated."""
     for place, (kind, (_, colour)) in enumerate(KINDS.items()):
         own, shift = rows[rows["kind"] == kind], place - 1.0
         _draw_line(ax, _case(own, KNOWN), colour, f"{kind} known", shift=shift)
-        _draw_line(ax, _case(own, ALONE), colour, f"{kind} alone", DASHES, shift)
+        _draw_line(ax, _case(own, ALONE), colour, f"{kind} alone", "white", shift)
     _coverage_axis(ax, rows)
-    _name(ax, [*KINDS.values(), ("dashed: estimated", palette.GREY)])
+    _name(ax, [*KINDS.values(), ("open: estimated", palette.GREY)])
 
 
 def _draw_blurs(ax: Axes, rows: DataFrame) -> None:
-    """Draw what is held against noise by the camera's blur; dashed where noise is estimated."""
+    """Draw what is held against noise by the camera's blur; open dots where it is estimated."""
     colours = palette.sweep_colours(rows["blur"].unique())
     for place, (blur, colour) in enumerate(colours.items()):
         own, shift = rows[rows["blur"] == blur], place - (len(colours) - 1) / 2
         _draw_line(ax, _case(own, KNOWN), colour, f"{blur:g} known", shift=shift)
-        _draw_line(ax, _case(own, ALONE), colour, f"{blur:g} alone", DASHES, shift)
+        _draw_line(ax, _case(own, ALONE), colour, f"{blur:g} alone", "white", shift)
     _coverage_axis(ax, rows)
     names = [(f"{blur:g} px", colour) for blur, colour in colours.items()]
-    _name(ax, [*names, ("dashed: estimated", palette.GREY)])
+    _name(ax, [*names, ("open: estimated", palette.GREY)])
 
 
 def _draw_line(
-    ax: Axes, rows: DataFrame, colour: Any, label: str, line: Any = "-", shift: float = 0.0
+    ax: Axes, rows: DataFrame, colour: Any, label: str, face: Any = None, shift: float = 0.0
 ) -> None:
     """Draw a coverage with its interval against noise, some steps aside of those beside it."""
+    line = {"linewidth": 1.0} if face is None else {"linewidth": 0.6, "markerfacecolor": face}
     rows = rows.sort_values("noise")
     at = rows["noise"] * _ASIDE**shift
     ax.vlines(at, 100 * rows["low"], 100 * rows["high"], color=colour, linewidth=0.8)
-    ax.plot(at, 100 * rows["held"], color=colour, linestyle=line, linewidth=1.0,
-            marker="o", markersize=2.4, label=label)  # fmt: skip
+    ax.plot(at, 100 * rows["held"], "o-", color=colour, markersize=2.8, label=label, **line)
 
 
 def _coverage_axis(ax: Axes, rows: DataFrame, regions: str = REGIONS["position"]) -> None:
     """Mark what should be held, and leave room for names below what is."""
-    ax.axhline(100 * LEVEL, color=palette.GREY, linewidth=0.7, linestyle=":")
+    ax.axhline(100 * LEVEL, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE)
     noise = np.sort(rows["noise"].unique())
     _noise_axis(ax, noise)
     low = min(82.0, 100 * float(rows["low"].min()) - 1)
@@ -236,13 +233,13 @@ def _noise_axis(ax: Axes, noise: Any) -> None:
         ax.set_xticks(noise, [f"{level:g}" for level in noise])
         ax.set_xticks([], minor=True)
     ax.set_xlim(noise[0] / 1.25, noise[-1] * 1.25)
-    ax.set_xlabel("noise (grey range 1)")
+    ax.set_xlabel(style.NOISE_AXIS)
 
 
 def _draw_strata(ax: Axes, table: DataFrame) -> None:
     """Draw what 90 % ellipses hold in quarters of the keypoints."""
     rows = table[(table["quantity"] == "position") & (table["level"] == LEVEL)]
-    ax.axhline(100 * LEVEL, color=palette.GREY, linewidth=0.7, linestyle=":")
+    ax.axhline(100 * LEVEL, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE)
     ticks: list[float] = []
     for place, stratum in enumerate(STRATA):
         at = 5 * place + np.arange(4)
@@ -262,7 +259,7 @@ def _draw_strata(ax: Axes, table: DataFrame) -> None:
 
 def _draw_reliability(ax: Axes, rows: DataFrame) -> None:
     """Draw the share that returns against the survival that was predicted, for every noise."""
-    ax.plot([0, 100], [0, 100], color=palette.GREY, linewidth=0.7, linestyle=":")
+    ax.plot([0, 100], [0, 100], color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE)
     colours = palette.sweep_colours(rows["noise"].unique())
     for noise, colour in colours.items():
         part = rows[rows["noise"] == noise]
@@ -286,24 +283,24 @@ def _draw_areas(ax: Axes, rows: DataFrame) -> None:
         part = rows[rows["guess"] == guess].sort_values("noise")
         ax.plot(part["noise"], part["auc"], "o-", color=colour, linewidth=1.2, label=guess)
     _noise_axis(ax, rows["noise"].unique())
-    ax.axhline(0.5, color=palette.GREY, linewidth=0.7, linestyle=":", label="chance")
+    ax.axhline(0.5, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE, label="chance")
     style.direct_label(ax, ax.get_xlim()[0], 0.5, "chance", palette.GREY, 2, 5, ha="left")
     ax.set_ylim(min(0.28, float(rows["auc"].min()) - 0.02), 1.0)  # names stand below chance
-    ax.set_ylabel("area under the ROC curve")
+    ax.set_ylabel(style.AREA_AXIS)
     _name(ax, list(GUESSES.values()))
 
 
 def _draw_weights(ax: Axes, table: DataFrame) -> None:
     """Draw errors with weights, and without low survival, over those of all alike."""
     shown = table[table["weights"] == "bars"]
-    ax.axhline(1.0, color=palette.GREY, linewidth=0.7, linestyle=":")
+    ax.axhline(1.0, color=palette.GREY, linewidth=0.7, linestyle=style.REFERENCE)
     for place, (task, (_, colour)) in enumerate(TASKS.items()):
-        for kept, line, face in (("all", "-", colour), ("surviving", DASHES, "white")):
+        for kept, width, face in (("all", 1.0, colour), ("surviving", 0.6, "white")):
             own = shown[(shown["task"] == task) & (shown["kept"] == kept)].sort_values("noise")
             at = own["noise"] * 1.05 ** (place - 1)
             ax.vlines(at, own["ratio_low"], own["ratio_high"], color=colour, linewidth=0.8)
-            ax.plot(at, own["ratio"], color=colour, linestyle=line, marker="o", linewidth=1.0,
-                    markerfacecolor=face, label=f"{task} {kept}")  # fmt: skip
+            ax.plot(at, own["ratio"], "o-", color=colour, linewidth=width, markerfacecolor=face,
+                    label=f"{task} {kept}")  # fmt: skip
     _noise_axis(ax, shown["noise"].unique())
     low, high = np.nanmin([*shown["ratio_low"], 0.8]), np.nanmax([*shown["ratio_high"], 1.1])
     ax.set_yscale("log")

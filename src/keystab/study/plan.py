@@ -87,9 +87,9 @@ FIGURES = {
             "truth_kappas.csv",
             "truth_causes.csv",
             "truth_auc.csv",
-            "truth_views.csv",
         )
     ),
+    "truth_cameras": Figure(("truth_views.csv",)),  # the same, of views with aliasing, blur, noise
     # what refinement keeps and loses of the true extrema
     "refinement": Figure(("refinement_choices.csv",)),
     # error bars of keypoints against second shots
