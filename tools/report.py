@@ -31,6 +31,7 @@ from keystab.errors import InputError
 from keystab.provenance.code_digest import fingerprint
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.study_folder import Study
+from keystab.study.overlays import names_of, on_command_line
 from keystab.study.plan import FIGURES
 from keystab.study.verdicts import VERDICTS
 from keystab.utils.files import written_whole
@@ -46,11 +47,12 @@ def caption(name: str, config: dict[str, Any]) -> str:
     return str(publish_parts(filled, writer="html5")["body"])
 
 
-def figure(name: str, config: dict[str, Any]) -> dict[str, Any]:
+def figure(name: str, config: dict[str, Any], overlays: list[str]) -> dict[str, Any]:
     """All that the page says about a figure."""
     module = importlib.import_module(f"keystab.figures.{name.lower()}")
     tables = [ROOT / config["results"] / "tables" / table for table in module.TABLES]
     png = ROOT / config["figures"] / f"{name}.png"
+    of_make = on_command_line([] if overlays == ["config/quick.yaml"] else overlays, make=True)
     return {
         "name": name,
         "title": (module.__doc__ or name).splitlines()[0].rstrip("."),
@@ -58,7 +60,7 @@ def figure(name: str, config: dict[str, Any]) -> dict[str, Any]:
         "caption": caption(name, config),
         "code": fingerprint(module.__name__),
         "tables": [(table.name, file_digest(table)) for table in tables],
-        "command": f"make {config['figures']}/{name}.pdf",
+        "command": f"make {config['figures']}/{name}.pdf{of_make}",
     }
 
 
@@ -126,7 +128,9 @@ def main(arguments: list[str]) -> int:
     html = environment.get_template(PAGE).render(
         version=keystab.__version__,
         draft=config["draft"],
-        figures=[figure(name, config) for name in FIGURES],
+        picture=config["reference"],
+        overlays=names_of(ROOT.resolve(), ["config/config.yaml", *overlays]),
+        figures=[figure(name, config, overlays) for name in FIGURES],
         claims=listed,
         verdicts={name: sum(one["verdict"] == name for one in listed) for name in VERDICTS},
         graph=drawn(graph, {*FIGURES, "claims"}),
