@@ -1,9 +1,9 @@
 """Why Snakemake would run a job again, in a person's words.
 
 Snakemake compares what a job is made from with what it wrote down when it ran. Of settings it knows
-the values that a rule is given: a set of 32 views is 32 shifts. Of code it knows a digest of all that
-a stage imports. Here the first become the setting that a person wrote, and the second the file that
-was edited.
+the values that a rule is given: a set of 32 views is 32 shifts. Of code it knows a digest of all
+that a stage imports. Here the first become the setting that a person wrote, and the second the file
+that was edited.
 """
 
 from __future__ import annotations
@@ -82,6 +82,8 @@ class Causes:
         What Snakemake wrote down, by output (`keystab.provenance.snakemake_records`).
     lock : path, optional
         ``environment.lock``.
+    package : path, optional
+        Folder of the library that jobs run.
     """
 
     def __init__(
@@ -89,10 +91,12 @@ class Causes:
         settings: Mapping[str, Any],
         records: Mapping[str, Record],
         lock: Path = Path("environment.lock"),
+        package: Path = PACKAGE_FOLDER,
     ) -> None:
         self.settings = settings
         self.records = records
         self.lock = lock
+        self.package = package
         sets = {name: views for name, views in settings.get("sets", {}).items() if views}
         self.sweep_of = {
             member.name: name
@@ -118,7 +122,7 @@ class Causes:
             elif head == "Incomplete output files":
                 found.append(Cause(f"{_some(files)} {_is_or_are(files)} unfinished"))
             elif head == "Updated input files":
-                found.append(Cause(f"{_some(files)} changed since then"))
+                found += self._edited(files, job)
         if "Code has changed" in reason:
             found.append(Cause("the rule has another command"))
         return list(dict.fromkeys(found)) or [Cause(reason)]
@@ -163,6 +167,17 @@ class Causes:
         """Words of a job that are its pictures or its outputs."""
         pictures = [word for name in PICTURE for word in options_of(job.words).get(name, [])]
         return {*pictures, *self.outputs_of(job)}
+
+    def _edited(self, files: str, job: Job) -> Iterator[Cause]:
+        """Inputs of other content than when they were used."""
+        options = options_of(job.words)
+        pictures = [
+            it for name in PICTURE for it in options.get(name, ()) if it in files.split(", ")
+        ]
+        yield from (Cause(f"{it} is another picture now", True) for it in pictures)
+        others = [it for it in files.split(", ") if it not in pictures]
+        if others:
+            yield Cause(f"{_some(', '.join(others))} {_was_or_were(others)} edited or made anew")
 
     def _parameters(self, before: str, now: str, job: Job) -> Iterator[Cause]:
         """Which settings, code and software are others than before."""
@@ -219,7 +234,7 @@ class Causes:
             return Cause(f"the code of {module} changed")
         files = [
             _shown(path)
-            for name, path, edited in files_behind(module)
+            for name, path, edited in files_behind(module, self.package)
             if edited > since and not self._as_it_was(name, edited)
         ]
         if not files:
@@ -237,7 +252,7 @@ class Causes:
         """When the first job started that Snakemake knows of, by the code that it ran."""
         found: dict[str, float] = {}
         for record in self.records.values():
-            for text in record.fields["params"]:
+            for text in record.fields["params"] or ():
                 if text.startswith("code of "):
                     start = record.fields["starttime"]
                     found[text] = min(found.get(text, start), start)
@@ -250,17 +265,18 @@ class Causes:
         for text, start in self._first_start.items():
             module, _, digest = text.removeprefix("code of ").partition(" = ")
             try:
-                if fingerprint(module) == digest:
-                    unchanged.append((start, frozenset(imported_modules(module))))
+                if fingerprint(module, self.package) == digest:
+                    names = frozenset(imported_modules(module, self.package))
+                    unchanged.append((start, names))
             except ValueError:  # a module that is no longer there
                 continue
         return unchanged
 
 
-def files_behind(module: str) -> Iterator[tuple[str, Path, float]]:
+def files_behind(module: str, package: Path) -> Iterator[tuple[str, Path, float]]:
     """Modules that a module imports in the end, their files, and when they were edited."""
-    for name in imported_modules(module):
-        path = PACKAGE_FOLDER.joinpath(*name.split(".")[1:])
+    for name in imported_modules(module, package):
+        path = package.joinpath(*name.split(".")[1:])
         path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
         yield name, path, path.stat().st_mtime
 
@@ -316,8 +332,8 @@ def of_views(
 
     Examples
     --------
-    >>> shifts = {"shift_y": (["0", "-0.25", "0.25"], ["0", "-0.25"]), "blur": (["1"] * 3, ["1"] * 2)}
-    >>> list(of_views("sets.translations", shifts, {"n_views": 2}))
+    >>> lists = {"shift_y": (["0", "-0.2", "0.2"], ["0", "-0.2"]), "blur": (["1"] * 3, ["1"] * 2)}
+    >>> list(of_views("sets.translations", lists, {"n_views": 2}))
     ['sets.translations.n_views was 3 and is 2']
     >>> list(of_views("sets.zooms", {"step": (["10", "15"], ["10", "14"])}, {"n_views": 2}))
     ['sets.zooms.step was 10 15 and is 10 14']

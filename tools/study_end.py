@@ -39,9 +39,7 @@ def short(line: str) -> str:
     return f"{line[:end]} and {line.count(', ', end)} more of a list\n" if end > 0 else line
 
 
-def ending(
-    settings: Mapping[str, Any], folder: Path = Path(), overlays: Sequence[str] = ()
-) -> str:
+def ending(settings: Mapping[str, Any], folder: Path = Path(), overlays: Sequence[str] = ()) -> str:
     """Verdicts of a finished study, and where they lie; nothing where there are none.
 
     Parameters

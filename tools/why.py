@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from keystab.provenance.code_digest import PACKAGE_FOLDER
 from keystab.provenance.shielded_environment import shielded
 from keystab.provenance.snakemake_records import read_records
 from keystab.study.overlays import noted, on_command_line, seen_from
@@ -70,7 +71,7 @@ def overwritten(
     before: Sequence[str] | None,
     now: Sequence[str],
 ) -> Iterator[str]:
-    """Whose results are lost; nothing where they are of the same settings and picture.
+    r"""Whose results are lost; nothing where they are of the same settings and picture.
 
     Parameters
     ----------
@@ -85,8 +86,8 @@ def overwritten(
 
     Examples
     --------
-    >>> for line in overwritten(["r/a"], [Cause("x", True, "roof.png")], ["r", "f"], [], ["my.yaml"]):
-    ...     print(line)
+    >>> causes, files = [Cause("another picture", True, "roof.png")], ["my.yaml"]
+    >>> print("\n".join(overwritten(["r/a"], causes, ["r", "f"], [], files)))
     In r and f are results of roof.png (make study): 1 file would be overwritten.
     To keep it, write folders of their own into my.yaml: results, figures and logs.
     """
@@ -102,13 +103,15 @@ def overwritten(
     yield f"To keep {it}, write folders of their own into {place}: results, figures and logs."
 
 
-def answer(plan: str, arguments: list[str], clock: Clock) -> list[str]:
-    """What a dry run says that prints commands, in lines for a person."""
+def answer(
+    plan: str, arguments: list[str], clock: Clock, package: Path = PACKAGE_FOLDER
+) -> list[str]:
+    """What a dry run in this folder says that prints commands, in lines for a person."""
     jobs = jobs_of_plan(plan)
     if not jobs:
         return ["Nothing would run: everything is up to date."]
     settings, project = settings_of(arguments), Path.cwd()
-    causes = Causes(settings, read_records(project))
+    causes = Causes(settings, read_records(project), package=package)
     found = [causes.of(job) for job in jobs]
     texts = ["; ".join(cause.text for cause in each) for each in found]
     said = [job.said for job in jobs]

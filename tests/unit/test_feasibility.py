@@ -116,7 +116,10 @@ def test_a_size_that_a_person_gave_is_named_and_not_the_picture(tmp_path):
     assert said_of_picture(picture, config, height) == line
     assert "picture too small: " in said_of_picture(picture, config, {"draft": True})
     # A sweep: one line for each of its members, as before.
-    config, width = changed(("sets.unbalanced.width", 400)), {"sets": {"unbalanced": {"width": 400}}}
+    config, width = (
+        changed(("sets.unbalanced.width", 400)),
+        {"sets": {"unbalanced": {"width": 400}}},
+    )
     said = said_of_picture(picture, config, width)
     assert [line.split()[1] for line in said.splitlines()] == ["sets.unbalanced_0p073.width", "sets.unbalanced_0p5.width"]  # fmt: skip
 

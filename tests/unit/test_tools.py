@@ -14,9 +14,10 @@ import pytest
 from keystab.utils.compiled_loops import forget_outdated
 
 TOOLS = Path(__file__).parents[2] / "tools"
+NAMES = ["causes", "interrupted", "overheads", "rule_graph", "study", "study_end", "why"]
 
 
-@pytest.mark.parametrize("name", ["interrupted", "overheads", "rule_graph", "study", "study_end"])
+@pytest.mark.parametrize("name", NAMES)
 def test_examples_of_tools(name, monkeypatch):
     monkeypatch.syspath_prepend(TOOLS)
     failed, tried = doctest.testmod(importlib.import_module(name))

@@ -17,6 +17,6 @@ def main(
 
     found = judged(claims, tables)
     head = heading(reference, settings, draft) if reference else ""
-    write_report(found, csv, json, markdown, head)
+    write_report(found, csv, json, markdown, head=head)
     for verdict, number in tally(found).items():
         print(f"{number:3d} {verdict}")

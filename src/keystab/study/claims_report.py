@@ -266,6 +266,7 @@ def write_report(
     csv: str | os.PathLike[str],
     json_file: str | os.PathLike[str],
     markdown: str | os.PathLike[str],
+    *,
     head: str = "",
 ) -> None:
     """Write the verdicts as a table, as JSON and, under a head, for people; each file whole."""

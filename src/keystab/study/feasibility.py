@@ -38,9 +38,7 @@ SWEPT_SETS = {
 """Sweeps of sets of views that are searched: what is made of them, and what they differ in."""
 
 
-def require(
-    settings: Settings, folder: Path | str = ".", written: Settings | None = None
-) -> None:
+def require(settings: Settings, folder: Path | str = ".", written: Settings | None = None) -> None:
     """Raise unless the study can be run.
 
     Parameters

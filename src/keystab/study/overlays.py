@@ -68,9 +68,7 @@ def of_a_person(project: Path | str, files: Iterable[Path | str]) -> list[str]:
     ['/project/my.yaml']
     """
     return [
-        str(file)
-        for file in files
-        if not seen_from(Path(project), [file])[0].startswith(_SHIPPED)
+        str(file) for file in files if not seen_from(Path(project), [file])[0].startswith(_SHIPPED)
     ]
 
 

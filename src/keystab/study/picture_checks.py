@@ -5,7 +5,6 @@ Every check is a plain function that returns one line per problem.
 
 from __future__ import annotations
 
-import bisect
 import math
 import re
 import shutil
@@ -180,16 +179,19 @@ def least_shape(sets: Settings, settings: Settings) -> tuple[tuple[int, int], li
 
     def alone(percent: int) -> list[str]:
         """Sets that have nothing in common in a picture of these proportions."""
-        larger = _scaled(shape, percent)
-        return [
-            name for name, each in searched.items() if common_problems(name, each, larger, settings)
-        ]
+        larger, found = _scaled(shape, percent), []
+        for name, views in searched.items():
+            try:
+                found += [name] if common_problems(name, views, larger, settings) else []
+            except InputError:  # a tilted view that sees the horizon
+                found.append(name)
+        return found
 
-    most = alone(100)[:1] or most
-    percents = range(100, 1001)
-    # The first percentage at which all have something in common, or none in this range.
-    first = bisect.bisect_left(percents, True, key=lambda percent: not alone(percent))
-    shape = _scaled(shape, percents[first] if first < len(percents) else 100)
+    if lone := alone(100):
+        most = lone[:1]
+        tens = next((it for it in range(110, 401, 10) if not alone(it)), 100)
+        percent = next((it for it in range(tens - 9, tens) if not alone(it)), tens)
+        shape = _scaled(shape, percent)
     # Members of a sweep share their size, which is given once for all.
     return shape, list(dict.fromkeys(_OF_SWEEP.sub("", name) for name in most))
 

@@ -16,6 +16,7 @@ from keystab.study.result_folders import normal_folder
 __all__ = ["Offered"]
 
 _NO_RULE = re.compile(r"No rule to produce (.+?) \(if you use")
+_NO_SET = re.compile(r"KeyError: '(\w+)'.*^ *set=\1$", re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Offered:
     Parameters
     ----------
     settings : mapping
-        Complete settings; folders ``results`` and ``figures`` of them count.
+        Complete settings; folders ``results`` and ``figures`` of them count, and ``sets``.
     scenes : iterable of str
         Places of scenes (`keystab.study.scenes.by_place`).
     rules : iterable
@@ -43,11 +44,24 @@ class Offered:
     project: Path = Path()
 
     def explain(self, record: logging.LogRecord) -> bool:
-        """Put what Snakemake logs of a missing rule into a person's words; a filter of its log."""
-        if getattr(record, "exception", "") == "MissingRuleException":
-            if found := _NO_RULE.search(record.getMessage()):
-                record.msg, record.args = f"error: {self.instead_of(found[1])}", ()
+        """Put what Snakemake logs of a wrong target into a person's words; a filter of its log."""
+        kind, said = getattr(record, "exception", ""), record.getMessage()
+        told = ""
+        if kind == "MissingRuleException" and (found := _NO_RULE.search(said)):
+            told = self.instead_of(found[1])
+        elif kind == "InputFunctionException" and (found := _NO_SET.search(said)):
+            told = self.instead_of_set(found[1])
+        if told:
+            record.msg, record.args = f"error: {told}", ()
         return True
+
+    def instead_of_set(self, name: str) -> str:
+        """One line for a set of views that the settings do not have."""
+        names = [*self.settings["sets"]]
+        near = difflib.get_close_matches(name, names, n=3)
+        if near:
+            return f"these settings have no set of views {name!r}; did you mean {_either(near)}?"
+        return f"these settings have no set of views {name!r}; they have {', '.join(names)}"
 
     def instead_of(self, target: str) -> str:
         """One line for a file that no rule makes: where it is made, or what is called nearly so.
@@ -59,8 +73,8 @@ class Offered:
         """
         path = normal_folder(target, self.project.absolute())
         return (
-            self._elsewhere(path)
-            or self._other_scene(path)
+            self._other_scene(path)
+            or self._elsewhere(path)
             or self._nearest(path)
             or f"{path}: these settings make no such file; figures are "
             f"{self.settings['figures']}/fig1.pdf and so on, tables lie in "
@@ -90,9 +104,9 @@ class Offered:
                 typed = "/".join(parts[:start])
                 files = overlays_of(self.project, typed, key) if typed else None
                 if files:
-                    line += f", or take those of {typed} with{on_command_line(files, make=False)}"
+                    line += f" ({path} is made with{on_command_line(files, make=False)})"
                 elif files is not None:
-                    line += f", or take those of {typed} by leaving out --configfile or WITH="
+                    line += f" ({path} is made without --configfile and WITH=)"
                 return line
         return ""
 
@@ -104,9 +118,9 @@ class Offered:
             return ""
         if not self._is_made(f"{path[: found.start()]}{names[0]}{path[found.end() :]}"):
             return ""
-        near = difflib.get_close_matches(found[0], names, n=3) or names
-        more = ", ..." if len(near) > 6 else ""
-        return f"{path}: there is no scene {found[0]!r}; there are {', '.join(near[:6])}{more}"
+        if near := difflib.get_close_matches(found[0], names, n=3):
+            return f"{path}: there is no scene {found[0]!r}; did you mean {_either(near)}?"
+        return f"{path}: there is no scene {found[0]!r}; there are {', '.join(names)}"
 
     def _nearest(self, path: str) -> str:
         """Files whose names are nearly the same; those in the right folder first."""
@@ -118,6 +132,9 @@ class Offered:
         files = [file for each in near for file in by_name[each]][:3]
         if not files:
             return ""
-        *others, last = files
-        named = f"{', '.join(others)} or {last}" if others else last
-        return f"{path}: these settings make no such file; did you mean {named}?"
+        return f"{path}: these settings make no such file; did you mean {_either(files)}?"
+
+
+def _either(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} or {last}" if others else last
