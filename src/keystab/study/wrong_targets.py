@@ -120,7 +120,9 @@ class Offered:
             return ""
         if near := difflib.get_close_matches(found[0], names, n=3):
             return f"{path}: there is no scene {found[0]!r}; did you mean {_either(near)}?"
-        return f"{path}: there is no scene {found[0]!r}; there are {', '.join(names)}"
+        more = f" and {len(names) - 6} more, of config/scenes.csv" if len(names) > 7 else ""
+        known = ", ".join(names[: 6 if more else None])
+        return f"{path}: there is no scene {found[0]!r}; there are {known}{more}"
 
     def _nearest(self, path: str) -> str:
         """Files whose names are nearly the same; those in the right folder first."""
@@ -128,7 +130,11 @@ class Offered:
         by_name: dict[str, list[str]] = {}
         for file in dict.fromkeys(self._wanted()):
             by_name.setdefault(PurePosixPath(file).name, []).append(file)
-        near = difflib.get_close_matches(name, by_name, n=3)
+        stem, dot, suffix = name.partition(".")
+        # A table of figure 5 for one that would be called like the figure, another kind of a file.
+        own = [it for it in by_name if dot and re.match(rf"{re.escape(stem)}[._]", it)]
+        own = [it for it in own if it.endswith(f".{suffix}")] or own
+        near = own or difflib.get_close_matches(name, by_name, n=3)
         files = [file for each in near for file in by_name[each]][:3]
         if not files:
             return ""
