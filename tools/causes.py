@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import re
 import shlex
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,14 +25,26 @@ from keystab.provenance.code_digest import (
 )
 from keystab.provenance.imported_software import software_problems
 from keystab.provenance.snakemake_records import Record
+from keystab.study.plan import setting
+from keystab.study.rule_parameters import spelled
+
+sys.path.insert(0, str(Path(__file__).parent))
+from changes import (  # noqa: E402
+    is_or_are,
+    of_views,
+    options_of,
+    parameters,
+    said,
+    shown,
+    some,
+    was_or_were,
+)
 
 FOLLOWS = "Input files updated by another job"
+DERIVED = "other values follow from these settings"
 PARAMS = re.compile(r"Union of exclusive params .*?: before: (?P<before>.*?) now: (?P<now>.*)$")
-PARAM = re.compile(
-    r"'?(?P<name>[\w.]+|code of [\w.]+) = (?P<value>.*?)'?(?=,'?[\w.]+ = |,'?code of |$)"
-)
-SHORT = 60
-"""Letters of a value that is shown as it is."""
+MEANT = 2
+"""Changes of settings that what follows from them is put down to."""
 
 PICTURE = ("reference", "picture")
 """Options of stages that name a picture."""
@@ -54,6 +67,8 @@ class Cause(NamedTuple):
     """Whether results of other settings, or of another picture, are lost by it."""
     picture: str = ""
     """The picture that these are of, if it was another one."""
+    follows: bool = False
+    """Whether it only follows from settings that are causes of other jobs."""
 
 
 JOB = re.compile(
@@ -105,22 +120,39 @@ class Causes:
             for member in members(sets, name)
         }
 
+    def of_all(self, jobs: Sequence[Job]) -> list[list[Cause]]:
+        """Causes of jobs; what only follows from settings by the names of these."""
+        found = [self.of(job) for job in jobs]
+        every = (it for each in found for it in each if it.overwrites and not it.follows)
+        meant = dict.fromkeys(every)
+        if not 0 < len(meant) <= MEANT:
+            text = "values changed that follow from these settings" if meant else ""
+            meant = {Cause(text, overwrites=True): None} if meant else {}
+        return [
+            list(
+                dict.fromkeys(it for one in each for it in (meant if one.follows else ()) or [one])
+            )
+            for each in found
+        ]
+
     def of(self, job: Job) -> list[Cause]:
         """Causes of a job, those first that a person is most likely to have meant."""
         reason = job.reason
         if FOLLOWS in reason:
             return [Cause(FOLLOWS)]
         found: list[Cause] = []
-        if "Set of input files has changed" in reason:
-            found += self._inputs(job)
         if params := PARAMS.search(reason):
             found += self._parameters(params["before"], params["now"], job)
+        if "Set of input files has changed" in reason:
+            inputs = list(self._inputs(job))
+            known = any(cause.overwrites for cause in found)  # settings, from which they follow
+            found = [*(it for it in inputs if it.picture or not known), *found]
         for part in reason.split("; "):
             head, _, files = part.partition(": ")
             if head == "Missing output files":
-                found.append(Cause(f"{_some(files)} {_is_or_are(files)} missing"))
+                found.append(Cause(f"{some(files)} {is_or_are(files)} missing"))
             elif head == "Incomplete output files":
-                found.append(Cause(f"{_some(files)} {_is_or_are(files)} unfinished"))
+                found.append(Cause(f"{some(files)} {is_or_are(files)} unfinished"))
             elif head == "Updated input files":
                 found += self._edited(files, job)
         if "Code has changed" in reason:
@@ -158,10 +190,10 @@ class Causes:
         gone = sorted(known - words)
         come = sorted(word for word in words - used if "/" in word and word not in self.lost(job))
         if gone and not any(name in before for name in PICTURE):
-            more = f", and from {_some(', '.join(come))}" if come else ""
-            yield Cause(f"it is no longer made from {_some(', '.join(gone))}{more}")
+            more = f", and from {some(', '.join(come))}" if come else ""
+            yield Cause(f"it is no longer made from {some(', '.join(gone))}{more}")
         elif come and not any(name in before for name in PICTURE):
-            yield Cause(f"it is also made from {_some(', '.join(come))}")
+            yield Cause(f"it is also made from {some(', '.join(come))}")
 
     def lost(self, job: Job) -> set[str]:
         """Words of a job that are its pictures or its outputs."""
@@ -177,19 +209,19 @@ class Causes:
         yield from (Cause(f"{it} is another picture now", True) for it in pictures)
         others = [it for it in files.split(", ") if it not in pictures]
         if others:
-            yield Cause(f"{_some(', '.join(others))} {_was_or_were(others)} edited or made anew")
+            yield Cause(f"{some(', '.join(others))} {was_or_were(others)} edited or made anew")
 
     def _parameters(self, before: str, now: str, job: Job) -> Iterator[Cause]:
         """Which settings, code and software are others than before."""
         old, new = parameters(before), parameters(now)
-        names = sorted(old.keys() | new.keys())
-        if "Set of input files has changed" in job.reason:
-            names = [name for name in names if name != "reference_sha256"]  # of another picture
-        settings = [name for name in names if "." in name or name in self.settings]
-        settings = [name for name in settings if not name.startswith(("code of ", "environment."))]
-        texts = self._of_settings(settings, old, new)
+        known = sorted(old.keys() | new.keys())
+        other_picture = "Set of input files has changed" in job.reason
+        names = [it for it in known if not (other_picture and it.startswith("reference"))]
+        settings = [name for name in names if self._is_setting(name, new.get(name))]
+        texts = list(self._of_settings(settings, old, new))
         yield from (Cause(text, overwrites=True) for text in texts)
-        for name in names:
+        rest = [name for name in names if name not in settings]
+        for name in rest:
             if name.startswith("code of "):
                 yield self._code(name.removeprefix("code of "), old.get(name, ""))
             elif name == "environment.lock":
@@ -197,10 +229,24 @@ class Causes:
                 yield Cause(problems[0] if problems else "environment.lock changed")
             elif name == "criteria":
                 yield Cause("config/claims.yaml has other claims or criteria")
-            elif name not in settings and not settings:  # what follows from settings
-                yield Cause(said(name, old.get(name, ""), new.get(name, "")), overwrites=True)
-        if not names:
+        derived = [it for it in rest if not it.startswith(("code of ", "environment."))]
+        if set(derived) - {"criteria"} and not texts:
+            changed = [said(it, old.get(it, ""), new.get(it, "")) for it in derived]
+            yield Cause("; ".join(changed), overwrites=True, follows=True)
+        if not known:
             yield Cause(f"parameters changed from {before.strip()} to {now.strip()}")
+
+    def _is_setting(self, name: str, value: str | None) -> bool:
+        """Whether a parameter is a setting as it is written, and does not follow from some."""
+        if name.startswith(("code of ", "environment.")):
+            return False
+        if name.startswith("sets.") or value is None:
+            return "." in name
+        try:
+            given = setting(self.settings, name)
+        except (KeyError, TypeError):
+            return "." in name
+        return value == " ".join(map(spelled, given if isinstance(given, list) else [given]))
 
     def _of_settings(
         self, names: Iterable[str], old: Mapping[str, str], new: Mapping[str, str]
@@ -233,13 +279,13 @@ class Causes:
         if since is None:
             return Cause(f"the code of {module} changed")
         files = [
-            _shown(path)
+            shown(path)
             for name, path, edited in files_behind(module, self.package)
             if edited > since and not self._as_it_was(name, edited)
         ]
         if not files:
             return Cause(f"the code of {module} changed (no file says by its date which)")
-        return Cause(f"{_some(', '.join(files))} {_was_or_were(files)} edited")
+        return Cause(f"{some(', '.join(files))} {was_or_were(files)} edited")
 
     def _as_it_was(self, name: str, edited: float) -> bool:
         """Whether a module, however new its file is, is the code that an older job ran."""
@@ -279,138 +325,3 @@ def files_behind(module: str, package: Path) -> Iterator[tuple[str, Path, float]
         path = package.joinpath(*name.split(".")[1:])
         path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
         yield name, path, path.stat().st_mtime
-
-
-# Words
-
-
-def parameters(text: str) -> dict[str, str]:
-    """Parameters of one side of a comparison by their names.
-
-    Examples
-    --------
-    >>> parameters("a.b = 1,c = x y ")
-    {'a.b': '1', 'c': 'x y'}
-    """
-    return {one["name"]: one["value"].strip() for one in PARAM.finditer(text.strip())}
-
-
-def options_of(words: Sequence[str]) -> dict[str, list[str]]:
-    """Options of a command with their values.
-
-    Examples
-    --------
-    >>> options_of(["python", "-m", "x", "--n-spo", "3", "5", "--table", "a.csv", ">log", "2>&1"])
-    {'n_spo': ['3', '5'], 'table': ['a.csv']}
-    """
-    found: dict[str, list[str]] = {}
-    name = ""
-    for word in words:
-        if word.startswith(">"):
-            break
-        if word.startswith("--"):
-            name = word.removeprefix("--").replace("-", "_")
-            found[name] = []
-        elif name:
-            found[name].append(word)
-    return found
-
-
-def of_views(
-    place: str, lists: Mapping[str, tuple[list[str], list[str]]], raw: Mapping[str, Any]
-) -> Iterator[str]:
-    """Lines on the views of a set, one value per view: what a person changed to get them.
-
-    Parameters
-    ----------
-    place : str
-        Place of the set in the settings.
-    lists : mapping
-        Values before and now, by what they are of.
-    raw : mapping
-        The set as a person wrote it.
-
-    Examples
-    --------
-    >>> lists = {"shift_y": (["0", "-0.2", "0.2"], ["0", "-0.2"]), "blur": (["1"] * 3, ["1"] * 2)}
-    >>> list(of_views("sets.translations", lists, {"n_views": 2}))
-    ['sets.translations.n_views was 3 and is 2']
-    >>> list(of_views("sets.zooms", {"step": (["10", "15"], ["10", "14"])}, {"n_views": 2}))
-    ['sets.zooms.step was 10 15 and is 10 14']
-    """
-    counts = {(len(old), len(new)) for old, new in lists.values() if len(old) != len(new)}
-    if counts:
-        before, now = max(counts)
-        if "n_views" in raw:
-            yield f"{place}.n_views was {before} and is {now}"
-        else:
-            yield f"{place} had {before} views and has {now}"
-    for key, (old, new) in sorted(lists.items()):
-        shared = min(len(old), len(new))
-        spread = (old[0], old[-1]) == (new[0], new[-1])  # zooms, in more or fewer steps
-        if len(old) != len(new) and (old[:shared] == new[:shared] or spread):
-            continue  # follows from the number
-        yield said(f"{place}.{key}", " ".join(old), " ".join(new))
-
-
-def said(name: str, old: str, new: str) -> str:
-    """One line on a setting that was one thing and is another.
-
-    Examples
-    --------
-    >>> said("detector.epsilon", "0", "1e-06")
-    'detector.epsilon was 0 and is 1e-06'
-    >>> said("sets.still.step", "10 10 10", "20 20 20")
-    'sets.still.step was 10 and is 20'
-    >>> said("samplings.n_spo", " ".join(map(str, range(3, 40))), " ".join(map(str, range(3, 38))))
-    'samplings.n_spo no longer has 38 39'
-    >>> many, moved = [" ".join(str(k / scale) for k in range(40)) for scale in (4, 5)]
-    >>> said("sets.zooms.step", many, moved)
-    'sets.zooms.step was 0.0 to 9.75 and is 0.0 to 7.8 (40 values)'
-    """
-    if re.fullmatch("[0-9a-f]{64}", old or new):
-        return f"{name} changed"
-    sides = [_joined(text.split()) for text in (old, new)]
-    if max(map(len, sides)) <= SHORT:
-        return f"{name} was {sides[0] or 'nothing'} and is {sides[1] or 'nothing'}"
-    before, now = old.split(), new.split()
-    gone, come = ([it for it in a if it not in b] for a, b in ((before, now), (now, before)))
-    told = [
-        f"{words} {_joined(values, SHORT)}"
-        for words, values in (("no longer has", gone), ("has in addition", come))
-        if values
-    ]
-    if len(before) == len(now) and (before[0], before[-1]) != (now[0], now[-1]):
-        ends = [f"{values[0]} to {values[-1]}" for values in (before, now)]
-        return f"{name} was {ends[0]} and is {ends[1]} ({len(now)} values)"
-    if len(gone) + len(come) < len(before) and told:
-        return f"{name} {' and '.join(told)}"
-    return f"{name} was {sides[0][:50]} ... and is {sides[1][:50]} ..."
-
-
-def _joined(values: Sequence[str], most: int = 10**6) -> str:
-    """Values in a row; one where all are the same."""
-    text = values[0] if len(set(values)) == 1 else " ".join(values)
-    return text if len(text) <= most else f"{text[:most]} ..."
-
-
-def _some(files: str) -> str:
-    names = sorted(files.split(", "))
-    more = f" and {len(names) - 2} more" if len(names) > 3 else ""
-    shown = names[:2] if more else names
-    if more or len(shown) == 1:
-        return ", ".join(shown) + more
-    return f"{', '.join(shown[:-1])} and {shown[-1]}"
-
-
-def _is_or_are(files: str) -> str:
-    return "are" if ", " in files else "is"
-
-
-def _was_or_were(files: Sequence[str]) -> str:
-    return "was" if len(files) == 1 else "were"
-
-
-def _shown(path: Path) -> str:
-    here = Path.cwd()
-    return path.relative_to(here).as_posix() if path.is_relative_to(here) else path.as_posix()

@@ -67,7 +67,9 @@ def ending(settings: Mapping[str, Any], folder: Path = Path(), overlays: Sequenc
     said = ", ".join(f"{counts[name]} {name}" for name in VERDICTS if counts[name])
     lines = ["", f"Verdicts{' of a draft' if draft else ''} on {picture}: {said}."]
     if surprising := clearest(claims):
-        lines.append("Most surprising, as the paper says otherwise and this run most clearly not:")
+        lines.append(
+            "Most surprising, what the paper says and this run most clearly does not find:"
+        )
     lines += [f"  {claim['id']}: {claim['statement']}" for claim in surprising]
     lines += [
         f"All verdicts: {results}/claims.md. Figures: {figures}/*.pdf. Numbers: {results}/tables.",

@@ -20,7 +20,7 @@ from keystab.study.overlays import noted, on_command_line, seen_from
 from keystab.study.result_folders import normal_folder
 
 sys.path.insert(0, str(Path(__file__).parent))
-from causes import FOLLOWS, Cause, Causes, jobs_of_plan  # noqa: E402
+from causes import DERIVED, FOLLOWS, Cause, Causes, jobs_of_plan  # noqa: E402
 from study import (  # noqa: E402
     Clock,
     config_files,
@@ -51,7 +51,7 @@ def in_lines(jobs: Sequence[tuple[str, str]], clock: Clock) -> Iterator[str]:
     reasons: dict[str, dict[str, list[str]]] = {}
     for job, reason in jobs:
         reasons.setdefault(reason, {}).setdefault(kind_of(job), []).append(job)
-    for reason in sorted(reasons, key=FOLLOWS.__eq__):
+    for reason in sorted(reasons, key=lambda it: (it == FOLLOWS, it == DERIVED)):
         yield "After these:" if reason == FOLLOWS else f"Because {reason}:"
         kinds = list(reasons[reason].values())
         for same in kinds[: MOST if len(kinds) > MOST + 1 else None]:
@@ -112,7 +112,7 @@ def answer(
         return ["Nothing would run: everything is up to date."]
     settings, project = settings_of(arguments), Path.cwd()
     causes = Causes(settings, read_records(project), package=package)
-    found = [causes.of(job) for job in jobs]
+    found = causes.of_all(jobs)
     texts = ["; ".join(cause.text for cause in each) for each in found]
     said = [job.said for job in jobs]
     lines = list(in_lines(list(zip(said, texts, strict=True)), clock))
@@ -134,7 +134,9 @@ def main(arguments: list[str]) -> int:
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=shielded()
     )
     if run.returncode:
-        print(run.stdout, end="")
+        lines = run.stdout.splitlines()
+        told = [line for line in lines if line.startswith(("error: ", "config: "))]
+        print("\n".join(told or lines), file=sys.stderr)
         return run.returncode
     print("\n".join(answer(run.stdout, arguments, Clock([], read_durations()))))
     return 0

@@ -14,7 +14,7 @@ import pytest
 from keystab.utils.compiled_loops import forget_outdated
 
 TOOLS = Path(__file__).parents[2] / "tools"
-NAMES = ["causes", "interrupted", "overheads", "rule_graph", "study", "study_end", "why"]
+NAMES = ["changes", "interrupted", "overheads", "rule_graph", "study", "study_end", "why"]
 
 
 @pytest.mark.parametrize("name", NAMES)
