@@ -156,6 +156,8 @@ def on_command_line(files: Sequence[str], make: bool) -> str:
     --------
     >>> on_command_line(["config/quick.yaml", "my.yaml"], make=True)
     " WITH='config/quick.yaml my.yaml'"
+    >>> print(on_command_line(["config/quick.yaml", "my roof.yaml"], make=True))
+     WITH="config/quick.yaml 'my roof.yaml'"
     >>> on_command_line(["my roof.yaml"], make=False)
     " --configfile 'my roof.yaml'"
     >>> on_command_line([], make=True)
@@ -165,5 +167,7 @@ def on_command_line(files: Sequence[str], make: bool) -> str:
         return ""
     if make:  # which hands the words on to a shell, and has its own use for $
         words = " ".join(map(shlex.quote, files)).replace("$", "$$")
+        if "'" in words and not set(words) & set('"$`!\\'):  # easier to read
+            return f' WITH="{words}"'
         return f" WITH={shlex.quote(words)}"
     return f" --configfile {shlex.join(files)}"
