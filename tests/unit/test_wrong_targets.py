@@ -74,11 +74,11 @@ def test_the_files_of_settings_of_the_last_run_there_are_named(folder):
 
 
 def test_a_set_of_views_that_is_not_in_the_settings_is_named(folder):
-    words = "Error:\n  KeyError: 'stil'\nWildcards:\n  place=\n  set=stil\nTraceback:\n  ..."
+    words = "Error:\n  KeyError: 'zoomz'\nWildcards:\n  place=\n  set=zoomz\nTraceback:\n  ..."
     record = logging.makeLogRecord({"msg": words, "exception": "InputFunctionException"})
     assert offered(folder).explain(record) is True
     assert record.getMessage() == (
-        "error: these settings have no set of views 'stil'; did you mean still?"
+        "error: these settings have no set of views 'zoomz'; did you mean zooms?"
     )
 
 
