@@ -149,12 +149,9 @@ def test_a_scene_that_is_not_in_the_settings_is_refused(planned):
 
 
 def test_what_no_rule_makes_is_said_with_where_it_is_made(planned):
-    for target, line in {
-        "figures/fig12.pdf": "error: figures/fig12.pdf: these settings draw into figures/quick: type figures/quick/fig12.pdf (figures/fig12.pdf is made without --configfile and WITH=)",
-        "results/quick/views/trnslations": "error: these settings have no set of views 'trnslations'; did you mean translations,",
-    }.items():
-        status, said = planned.dry_run(*QUICK, "--", target)
-        assert status != 0 and any(each.startswith(line) for each in said.splitlines())
+    status, said = planned.dry_run(*QUICK, "--", "figures/fig12.pdf")
+    line = "error: figures/fig12.pdf: these settings draw into figures/quick: type figures/quick/fig12.pdf"
+    assert status != 0 and any(each.startswith(line) for each in said.splitlines())
 
 
 def test_a_change_of_the_view_of_the_default_scene_touches_no_other(finished):
