@@ -10,6 +10,9 @@ results/claims.md, a verdict for every claim of the paper, and results/final.sha
     snakemake --configfile config/what_if/X.yaml -j2   another answer to one question
 """
 
+from keystab.study.wrong_targets import Offered
+from snakemake.logging import logger
+
 
 configfile: "config/config.yaml"
 
@@ -38,3 +41,9 @@ rule all:
         expand(f"{RESULTS}/scale_space/n{{n_spo}}.sha256", n_spo=plan.kept_n_spo(STUDY)),
     message:
         "All figures, tables and verdicts"
+
+
+# Of a file that no rule makes, Snakemake says no more than that.
+if workflow.modifier.is_main_snakefile():
+    FINAL = plan.final_files("", RESULTS, config["figures"], CLAIMED)
+    logger.addFilter(Offered(STUDY, SCENES, workflow.rules, FINAL).explain)

@@ -7,6 +7,7 @@ nor the command `keystab`, nor an import of the library: these look for loops be
 import os
 import shutil
 from pathlib import Path
+from unittest import mock
 
 from keystab.provenance.code_digest import PACKAGE_FOLDER, folder_of_loops, modules_of_loops
 from keystab.utils.compiled_loops import forget_outdated
@@ -48,6 +49,8 @@ if __name__ == "__main__":
     from keystab.truth.scene_extrema import scene_extrema
     from keystab.truth.true_extrema import true_extrema
 
+    # Who waits for this has been told so by the set-up.
+    mock.patch("keystab.scalespace.dog.tell_of_compilation").start()
     picture, large = (np.random.default_rng(0).random((side, side)) for side in (40, 88))
     for oversampling in ("spline", "cosine"):
         detect_keypoints(picture, 0.5, n_spo=4, oversampling=oversampling)

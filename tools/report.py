@@ -43,6 +43,7 @@ from keystab.provenance.code_digest import fingerprint
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.study_folder import Study
 from keystab.study.claims import Claim, read_claims
+from keystab.study.overlays import names_of, on_command_line
 from keystab.study.plan import FIGURES
 from keystab.utils.files import written_whole
 
@@ -83,7 +84,9 @@ def caption(name: str, config: Mapping[str, Any]) -> str:
     return str(publish_parts(filled, writer="html5", settings_overrides=_DOCUTILS)["body"])
 
 
-def figure(name: str, config: Mapping[str, Any], claims: Sequence[Mapping[str, Any]]) -> Any:
+def figure(
+    name: str, config: Mapping[str, Any], claims: Sequence[Mapping[str, Any]], typed: str
+) -> Any:
     """All that the page says about a figure."""
     module = importlib.import_module(f"keystab.figures.{name.lower()}")
     tables = [ROOT / config["results"] / "tables" / table for table in module.TABLES]
@@ -97,7 +100,7 @@ def figure(name: str, config: Mapping[str, Any], claims: Sequence[Mapping[str, A
         "caption": caption(name, config),
         "code": fingerprint(module.__name__),
         "tables": [(table.name, file_digest(table)) for table in tables],
-        "command": f"make {config['figures']}/{name}.pdf",
+        "command": f"make {config['figures']}/{name}.pdf{typed}",
         "claims": [claim for claim in claims if claim["figure"] == name],
     }
 
@@ -211,25 +214,26 @@ def commit() -> str:
 
 
 def facts(
-    config: Mapping[str, Any], overlays: Sequence[object], about: Mapping[str, str], when: float
+    config: Mapping[str, Any], overlays: Sequence[str], about: Mapping[str, str], when: float
 ) -> list[tuple[str, str]]:
     """What a reviewer asks first of a run: when, which code, which picture, which settings."""
     day = datetime.datetime.fromtimestamp(when, datetime.UTC)
     samplings = config["samplings"]["n_spo"]
-    laid_over = "".join(f", {overlay}" for overlay in overlays)
+    files = ", ".join(names_of(ROOT.resolve(), ["config/config.yaml", *overlays]))
     return [
         ("Verdicts of", f"{day:%Y-%m-%d %H:%M} UTC"),
         ("Version", f"keystab {keystab.__version__}"),
         ("Commit", commit()),
         ("Picture", f"{about['name']}, {about['size']}" if about["size"] else about["name"]),
-        ("Settings", f"config/config.yaml{laid_over}"),
+        ("Settings", files),
         ("Samplings", f"n_spo = {min(samplings)} to {max(samplings)}, {len(samplings)} of them"),
     ]
 
 
-def page(config: Mapping[str, Any], overlays: Sequence[object], made_from: Any, edges: Any) -> str:
+def page(config: Mapping[str, Any], overlays: Sequence[str], made_from: Any, edges: Any) -> str:
     """The page, from the files of a finished run."""
     path = ROOT / config["results"] / "claims.json"
+    typed = on_command_line([] if overlays == ["config/quick.yaml"] else overlays, make=True)
     claims = in_order(json.loads(path.read_text(encoding="utf-8")))
     known = {claim.id: claim for claim in read_claims(ROOT / "config/claims.yaml")}
     about = picture(config)
@@ -250,7 +254,7 @@ def page(config: Mapping[str, Any], overlays: Sequence[object], made_from: Any, 
         draft=config["draft"],
         picture=about,
         facts=facts(config, overlays, about, path.stat().st_mtime),
-        figures=[figure(name, config, claims) for name in FIGURES],
+        figures=[figure(name, config, claims, typed) for name in FIGURES],
         shown=set(FIGURES),
         groups=[(name, [one for one in claims if one["verdict"] == name]) for name in ORDER],
         without_figure=[claim for claim in claims if claim["figure"] not in FIGURES],

@@ -242,7 +242,8 @@ def main(arguments: list[str]) -> int:
         except KeyboardInterrupt:  # Snakemake got it as well, and puts its jobs away
             print(run.stdout.read(), end="", flush=True)
     if run.returncode == 0 and whole:
-        print(ending(settings_of(arguments)), end="", flush=True)
+        end = ending(settings_of(arguments), overlays=config_files(arguments))
+        print(end, end="", flush=True)
     if record is not None and run.returncode == 0:
         write_durations(taken, record)
     if locked:

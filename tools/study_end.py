@@ -8,7 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from keystab.study.overlays import on_command_line
+from keystab.study.result_folders import normal_folder
 from keystab.study.verdicts import VERDICTS
+
+DRAFT = "config/quick.yaml"
+"""Settings that make a draft of any study."""
 
 SHOWN = 3
 """Claims that are named, of those that do not hold."""
@@ -34,7 +39,7 @@ def short(line: str) -> str:
     return f"{line[:end]} and {line.count(', ', end)} more of a list\n" if end > 0 else line
 
 
-def ending(settings: Mapping[str, Any], folder: Path = Path()) -> str:
+def ending(settings: Mapping[str, Any], folder: Path = Path(), overlays: Sequence[str] = ()) -> str:
     """Verdicts of a finished study, and where they lie; nothing where there are none.
 
     Parameters
@@ -43,6 +48,8 @@ def ending(settings: Mapping[str, Any], folder: Path = Path()) -> str:
         Complete settings of the run.
     folder : path, optional
         Folder that relative paths in them start from.
+    overlays : sequence of str, optional
+        Files of settings of the run, as they were typed.
 
     Returns
     -------
@@ -55,18 +62,44 @@ def ending(settings: Mapping[str, Any], folder: Path = Path()) -> str:
     except (OSError, ValueError):
         return ""
     counts = Counter(claim["verdict"] for claim in claims)
-    head = "Verdicts of a draft, on" if settings.get("draft") else "Verdicts on"
+    draft = bool(settings.get("draft"))
     picture = settings.get("reference", "no picture")  # a study of theory has none
     said = ", ".join(f"{counts[name]} {name}" for name in VERDICTS if counts[name])
-    lines = ["", f"{head} {picture}: {said}."]
-    lines += [
-        f"  {claim['id']}: {claim['statement']} ({claim['verdict']})" for claim in clearest(claims)
-    ]
+    lines = ["", f"Verdicts{' of a draft' if draft else ''} on {picture}: {said}."]
+    if surprising := clearest(claims):
+        lines.append(
+            "Most surprising, what the paper says and this run most clearly does not find:"
+        )
+    lines += [f"  {claim['id']}: {claim['statement']}" for claim in surprising]
     lines += [
         f"All verdicts: {results}/claims.md. Figures: {figures}/*.pdf. Numbers: {results}/tables.",
-        "Next: make report (all in one page), make verify (check it), make archive (pack it).",
+        f"Next: {what_next(overlays, draft)}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def what_next(overlays: Sequence[str], draft: bool) -> str:
+    """What to type after a finished study: after a draft the study, else what is made of it.
+
+    Examples
+    --------
+    >>> what_next(["config/quick.yaml"], draft=True)
+    'make study (the same in full; this was a draft)'
+    >>> what_next(["config/quick.yaml", "my.yaml"], draft=True)
+    'make study WITH=my.yaml (the same in full; this was a draft)'
+    >>> print(what_next(["my.yaml"], draft=False))
+    make report WITH=my.yaml (all on one page)
+      make verify WITH=my.yaml (check it)
+      make archive WITH=my.yaml (pack it)
+    """
+    if draft:
+        full = [name for name in overlays if normal_folder(name) != DRAFT]
+        more = on_command_line(full, make=True)
+        return f"make study{more} (the same in full; this was a draft)"
+    more = on_command_line(overlays, make=True)
+    tasks = {"report": "all on one page", "verify": "check it", "archive": "pack it"}
+    commands = [f"make {task}{more} ({does})" for task, does in tasks.items()]
+    return ("\n  " if more else ", ").join(commands)
 
 
 def clearest(claims: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

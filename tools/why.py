@@ -1,97 +1,57 @@
-"""Say what would run, why, and for how long.
+"""Say what would run, why, and for how long, and whose results it would overwrite.
 
 python tools/why.py [targets and arguments of snakemake]
 
-Snakemake plans the jobs and gives its reasons; here they are put together and into words. Times are
-those of an earlier run (tools/durations.csv).
+Snakemake plans the jobs and gives its reasons; here they are put together and into words
+(tools/causes.py). Times are those of an earlier run (tools/durations.csv).
 """
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from keystab.provenance.code_digest import PACKAGE_FOLDER
 from keystab.provenance.shielded_environment import shielded
-from keystab.provenance.study_folder import jobs_and_reasons
+from keystab.provenance.snakemake_records import read_records
+from keystab.study.overlays import noted, on_command_line, seen_from
+from keystab.study.result_folders import normal_folder
 
 sys.path.insert(0, str(Path(__file__).parent))
-from study import Clock, in_words, kind_of, read_durations, wrong_file  # noqa: E402
-
-PARAMS = re.compile(r"Union of exclusive params .*?: before: (?P<before>.*?) now: (?P<now>.*)$")
-PARAM = re.compile(
-    r"'?(?P<name>[\w.]+|code of [\w.]+) = (?P<value>.*?)'?(?=,'?[\w.]+ = |,'?code of |$)"
+from causes import DERIVED, FOLLOWS, Cause, Causes, jobs_of_plan  # noqa: E402
+from study import (  # noqa: E402
+    Clock,
+    config_files,
+    in_words,
+    kind_of,
+    read_durations,
+    settings_of,
+    wrong_file,
 )
-FOLLOWS = "Input files updated by another job"
+
 MOST = 8
 """Lines that one reason may take."""
 
 
-def in_short(reason: str) -> str:
-    """Put a reason of Snakemake's into words.
+def in_lines(jobs: Sequence[tuple[str, str]], clock: Clock) -> Iterator[str]:
+    """The answer, a few lines long: reasons, and the jobs that run for each.
 
-    Examples
-    --------
-    >>> in_short("Missing output files: a.csv, b.csv, c.csv, d.csv")
-    'files are missing: a.csv, b.csv and 2 more'
-    >>> both = "Params have changed since last execution: Union of exclusive params before and now "
-    >>> both += "across all output: before: a.b = 1,c = x y now: c = x,a.b = 2 "
-    >>> in_short(both)
-    'a.b was 1 and is 2; c was x y and is x'
+    Parameters
+    ----------
+    jobs : sequence of (str, str)
+        What each says about itself, and why it runs.
+    clock : Clock
+        Knows how long jobs take.
     """
-    if FOLLOWS in reason:
-        return FOLLOWS
-    parts: list[str] = []
-    head, _, files = reason.partition(": ")
-    if found := PARAMS.search(reason):
-        parts += changes(found["before"].strip(), found["now"].strip())
-    elif head == "Missing output files":
-        parts.append(f"files are missing: {_some(files)}")
-    elif head == "Updated input files":
-        parts.append(f"files have other content: {_some(files)}")
-    if "Code has changed" in reason:
-        parts.append("the rule has another command")
-    if "Set of input files has changed" in reason:
-        parts.append("the list of its inputs is another one")
-    return "; ".join(parts) or reason
-
-
-def changes(before: str, now: str) -> Iterator[str]:
-    """What changed between two lists of parameters, in alphabetical order."""
-    old, new = (
-        {one["name"]: one["value"] for one in PARAM.finditer(text)} for text in (before, now)
-    )
-    for name in sorted(old.keys() | new.keys()):
-        values = [_short(side.get(name, "")) for side in (old, new)]
-        if re.fullmatch("[0-9a-f]{64}", old.get(name, new.get(name, ""))):
-            yield f"{name} changed"
-        else:
-            yield f"{name} was {values[0]} and is {values[1]}"
-    if not old and not new:
-        yield f"parameters changed from {before} to {now}"
-
-
-def _short(value: str) -> str:
-    return value if 0 < len(value) <= 60 else f"{value[:50]} ..." if value else "nothing"
-
-
-def _some(files: str) -> str:
-    names = sorted(files.split(", "))
-    more = f" and {len(names) - 2} more" if len(names) > 3 else ""
-    return ", ".join(names[:2] if more else names) + more
-
-
-def in_lines(jobs: list[tuple[str, str]], clock: Clock) -> Iterator[str]:
-    """The answer, a few lines long: reasons, and the jobs that run for each."""
     total = sum(clock.weight(job) for job, _ in jobs)
     number = "1 job" if len(jobs) == 1 else f"{len(jobs)} jobs"
     yield f"{number} would run, about {in_words(total)} one at a time."
     reasons: dict[str, dict[str, list[str]]] = {}
     for job, reason in jobs:
-        reasons.setdefault(in_short(reason), {}).setdefault(kind_of(job), []).append(job)
-    for reason in sorted(reasons, key=FOLLOWS.__eq__):
+        reasons.setdefault(reason, {}).setdefault(kind_of(job), []).append(job)
+    for reason in sorted(reasons, key=lambda it: (it == FOLLOWS, it == DERIVED)):
         yield "After these:" if reason == FOLLOWS else f"Because {reason}:"
         kinds = list(reasons[reason].values())
         for same in kinds[: MOST if len(kinds) > MOST + 1 else None]:
@@ -104,24 +64,81 @@ def in_lines(jobs: list[tuple[str, str]], clock: Clock) -> Iterator[str]:
             yield f"  and {len(rest)} other jobs ({taken})"
 
 
+def overwritten(
+    outputs: Sequence[str],
+    causes: Sequence[Cause],
+    folders: Sequence[str],
+    before: Sequence[str] | None,
+    now: Sequence[str],
+) -> Iterator[str]:
+    r"""Whose results are lost; nothing where they are of the same settings and picture.
+
+    Parameters
+    ----------
+    outputs : sequence of str
+        Files that are there and would be made again.
+    causes : sequence of Cause
+        Why.
+    folders : sequence of str
+        Folders of results and figures.
+    before, now : sequence of str
+        Files of settings of the last run there, where it is known, and of this one.
+
+    Examples
+    --------
+    >>> causes, files = [Cause("another picture", True, "roof.png")], ["my.yaml"]
+    >>> print("\n".join(overwritten(["r/a"], causes, ["r", "f"], [], files)))
+    In r and f are results of roof.png (make study): 1 file would be overwritten.
+    To keep it, write folders of their own into my.yaml: results, figures and logs.
+    """
+    if not outputs or not any(cause.overwrites for cause in causes):
+        return
+    pictures = sorted({cause.picture for cause in causes if cause.picture})
+    whose = f"results of {' and '.join(pictures)}" if pictures else "results of other settings"
+    if before is not None and list(before) != list(now):
+        whose += f" (make study{on_command_line(before, make=True)})"
+    count, it = (f"{len(outputs)} files", "them") if len(outputs) > 1 else ("1 file", "it")
+    yield f"In {' and '.join(folders)} are {whose}: {count} would be overwritten."
+    place = now[-1] if now else "a file of settings (WITH=)"
+    yield f"To keep {it}, write folders of their own into {place}: results, figures and logs."
+
+
+def answer(
+    plan: str, arguments: list[str], clock: Clock, package: Path = PACKAGE_FOLDER
+) -> list[str]:
+    """What a dry run in this folder says that prints commands, in lines for a person."""
+    jobs = jobs_of_plan(plan)
+    if not jobs:
+        return ["Nothing would run: everything is up to date."]
+    settings, project = settings_of(arguments), Path.cwd()
+    causes = Causes(settings, read_records(project), package=package)
+    found = causes.of_all(jobs)
+    texts = ["; ".join(cause.text for cause in each) for each in found]
+    said = [job.said for job in jobs]
+    lines = list(in_lines(list(zip(said, texts, strict=True)), clock))
+    folders = [normal_folder(str(settings[key])) for key in ("results", "figures")]
+    outputs = {name for job in jobs for name in causes.outputs_of(job) if Path(name).exists()}
+    now = seen_from(project, config_files(arguments))
+    every = [cause for each in found for cause in each]
+    return [*lines, *overwritten(sorted(outputs), every, folders, noted(project, folders[0]), now)]
+
+
 def main(arguments: list[str]) -> int:
     """Plan, and explain the plan."""
     wrong = wrong_file(arguments)
     if wrong:
         print(f"error: {wrong}", file=sys.stderr)
         return 2
-    command = [sys.executable, "-m", "snakemake", "--dry-run", *arguments]
+    command = [sys.executable, "-m", "snakemake", "--dry-run", "--printshellcmds", *arguments]
     run = subprocess.run(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=shielded()
     )
     if run.returncode:
-        print(run.stdout, end="")
+        lines = run.stdout.splitlines()
+        told = [line for line in lines if line.startswith(("error: ", "config: "))]
+        print("\n".join(told or lines), file=sys.stderr)
         return run.returncode
-    jobs = jobs_and_reasons(run.stdout)
-    if jobs:
-        print("\n".join(in_lines(jobs, Clock([], read_durations()))))
-    else:
-        print("Nothing would run: everything is up to date.")
+    print("\n".join(answer(run.stdout, arguments, Clock([], read_durations()))))
     return 0
 
 

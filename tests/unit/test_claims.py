@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from keystab import __version__
 from keystab.errors import InputError
 from keystab.stages import check_claims
 from keystab.study import claims, claims_report, expressions, verdicts
@@ -491,6 +492,19 @@ def test_the_stage_writes_the_ledger_and_prints_the_tally(tmp_path, capsys):
     text = out["markdown"].read_text()
     assert "| reproduced | 2 |" in text and "## Reproduced with a condition" not in text
     assert "Either \\| or." in text and "rates has no row with n_spo == 4" in text
+
+    # Of which run it is says one line more, of people's form only.
+    before = {kind: path.read_bytes() for kind, path in out.items()}
+    about = ["--reference", "roof.png", "--settings", "config/config.yaml", "my.yaml"]
+    assert check_claims.main([*arguments, *about, "--draft", "True"]) == 0
+    assert {kind for kind, path in out.items() if path.read_bytes() != before[kind]} == {"markdown"}
+    headed = out["markdown"].read_text()
+    (line,) = (line for line in headed.splitlines() if "Picture: " in line)
+    assert line.startswith(
+        "*Draft.* Picture: `roof.png`. Settings: `config/config.yaml`, `my.yaml`."
+    )
+    assert __version__ in line and claims_report.without_heading(headed) == text
+    assert claims_report.without_heading(text) == text
 
 
 def test_the_stage_explains_a_missing_table(tmp_path, capsys):

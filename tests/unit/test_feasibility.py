@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from keystab.camera.view_sets import per_view, view_shapes, view_specs
@@ -76,6 +78,50 @@ def test_contradictions_get_one_line(changes, line, monkeypatch):
         feasibility.require(changed(("results", "empty"), *changes), ROOT)
     (said,) = str(caught.value).splitlines()
     assert said.startswith(f"config: {line}")
+
+
+def said_of_picture(path: Path, config: dict, written: dict | None = None) -> str:
+    config = {**config, "reference": str(path), "results": str(path.parent / "r")}
+    with pytest.raises(InputError) as caught:
+        feasibility.require(config, ROOT, written)
+    return str(caught.value)
+
+
+def picture_of(path: Path, height: int, width: int) -> Path:
+    """A picture of which nobody looks at the pixels."""
+    np.lib.format.open_memmap(path, "w+", np.uint8, (height, width))
+    return path
+
+
+@pytest.mark.parametrize("overlay", ["config.yaml", "quick.yaml"])
+def test_a_small_picture_is_said_to_be_small_and_how_large_it_must_be(overlay, tmp_path):
+    given = settings.read_yaml(ROOT / "config/config.yaml", ROOT / "config" / overlay)
+    config = settings.checked(given, SCHEMA)
+    said = said_of_picture(picture_of(tmp_path / "a.npy", 100, 140), config, {})
+    assert said.startswith("config: picture too small: ") and "\n" not in said
+    assert "has 100 x 140 pixels (height x width)" in said and "_0p" not in said
+    height, width = map(int, re.search(r"at least (\d+) x (\d+);", said).groups())
+    least = picture_of(tmp_path / "least.npy", height, width)
+    own = {**config, "reference": str(least), "results": str(tmp_path / "r")}
+    feasibility.require(own, ROOT, {})
+    for less in ((height - 1, width), (height, width - 1)):
+        said = said_of_picture(picture_of(tmp_path / "less.npy", *less), config, {})
+        assert f"at least {height} x {width};" in said
+
+
+def test_a_size_that_a_person_gave_is_named_and_not_the_picture(tmp_path):
+    picture = picture_of(tmp_path / "a.npy", 2000, 3000)
+    config, height = changed(("sets.still.height", 201)), {"sets": {"still": {"height": 201}}}
+    line = "config: sets.still.height is 201, allowed is at most 200: the reference has 2000 px, the step is 10"
+    assert said_of_picture(picture, config, height) == line
+    assert "picture too small: " in said_of_picture(picture, config, {"draft": True})
+    # A sweep: one line for each of its members, as before.
+    config, width = (
+        changed(("sets.unbalanced.width", 400)),
+        {"sets": {"unbalanced": {"width": 400}}},
+    )
+    said = said_of_picture(picture, config, width)
+    assert [line.split()[1] for line in said.splitlines()] == ["sets.unbalanced_0p073.width", "sets.unbalanced_0p5.width"]  # fmt: skip
 
 
 def test_stores_that_exist_need_no_more_room(tmp_path, monkeypatch):

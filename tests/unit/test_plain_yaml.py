@@ -6,8 +6,8 @@ import pytest
 import yaml
 
 from keystab.errors import InputError
-from keystab.provenance.lineage import _overlay
 from keystab.study.claims import read_claims
+from keystab.study.overlays import overlays_of
 from keystab.study.plain_yaml import plain_yaml, read_plain_yaml
 from keystab.study.settings import read_yaml
 
@@ -80,4 +80,5 @@ def test_whence_is_not_stopped_by_a_file_that_is_none_of_its_own(tmp_path):
     for name, data in {"a": "ü".encode("latin-1"), "b": b"[" * 3000, "c": b"- 1", "d": b"\xff\xfea"}.items():  # fmt: skip
         (tmp_path / f"config/aside/{name}.yaml").write_bytes(data)
     (tmp_path / "config/mine.yaml").write_text("figures: ./figures/mine/\n")
-    assert _overlay("figures/mine", tmp_path, " WITH=", "make") == " WITH=config/mine.yaml"
+    (tmp_path / "config/config.yaml").write_text("figures: figures\n")
+    assert overlays_of(tmp_path, "figures/mine") == ["config/mine.yaml"]

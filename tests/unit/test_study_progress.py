@@ -108,6 +108,12 @@ def test_the_end_of_a_study_says_what_was_found_and_where_it_lies(tmp_path, monk
     (tmp_path / "r/claims.json").write_text(json.dumps(claims))
     lines = ending(settings, tmp_path).splitlines()
     assert lines[1] == "Verdicts on roof.png: 1 reproduced, 4 not reproduced."
-    assert [line.split(":")[0].strip() for line in lines[2:5]] == ["d", "c", "e"]
-    assert "r/claims.md" in lines[5] and "f/*.pdf" in lines[5]
-    assert ending(settings | {"draft": True}, tmp_path).startswith("\nVerdicts of a draft")
+    assert lines[2].startswith("Most surprising")
+    assert [line.split(":")[0].strip() for line in lines[3:6]] == ["d", "c", "e"]
+    assert "r/claims.md" in lines[6] and "f/*.pdf" in lines[6]
+    assert lines[7].startswith("Next: make report (") and "make study" not in lines[7]
+    own = ending(settings, tmp_path, ["my roof.yaml"])
+    assert all(f"make {task} WITH=" in own for task in ("report", "verify", "archive"))
+    draft = ending(settings | {"draft": True}, tmp_path, ["config/quick.yaml"])
+    assert draft.startswith("\nVerdicts of a draft") and "Next: make study (" in draft
+    assert "make report" not in draft

@@ -15,6 +15,7 @@ from keystab.utils.compiled_loops import forget_outdated
 
 TOOLS = Path(__file__).parents[2] / "tools"
 NAMES = [
+    "changes",
     "findings",
     "interrupted",
     "overheads",
@@ -25,6 +26,7 @@ NAMES = [
     "study",
     "study_end",
     "tutorial",
+    "why",
 ]
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import json
 import re
+import shlex
 import shutil
 import zipfile
 from pathlib import Path
@@ -30,6 +31,7 @@ from keystab.provenance import (
 from keystab.provenance.run_description import ABOUT, LEFT_OUT, SUMS
 from keystab.provenance.study_folder import Study
 from keystab.provenance.unpacking import Unpacked, unpacked
+from keystab.study import overlays
 
 FIGURES = ("fig1.pdf", "fig1.png", "figS3.pdf", "figS3.png")
 
@@ -448,16 +450,30 @@ def test_whence_follows_a_figure_to_the_scene_and_says_what_changed(here, monkey
     assert "drawn by keystab 1?[2J?2" in said and said.replace("\n", "").isprintable()
 
 
-def test_whence_names_the_command_with_its_settings(here):
-    assert list(lineage._commands("figures/fig1.pdf", here.project))[0] == "make figures/fig1.pdf"
+def test_whence_names_commands_that_can_be_pasted(here):
+    def pasted(figure: str) -> list[list[str]]:
+        lines = lineage._commands(figure, here.project)
+        return [shlex.split(line) for line in lines if line.startswith("  ")]
+
+    assert pasted("figures/fig1.pdf")[0] == ["make", "figures/fig1.pdf"]
     (here.project / "config/what_if").mkdir()
     (here.project / "config/what_if/sharp.yaml").write_text("figures: figures/sharp\n")
     (here.project / "config/broken.yaml").write_text("{")
-    make, snakemake = lineage._commands("figures/sharp/fig1.pdf", here.project)
-    assert make == "make figures/sharp/fig1.pdf WITH=config/what_if/sharp.yaml"
-    assert snakemake.endswith("figures/sharp/fig1.pdf -j2 --configfile config/what_if/sharp.yaml")
-    make, _ = lineage._commands("figures/lost/fig1.pdf", here.project)
-    assert make == "make figures/lost/fig1.pdf WITH=the settings whose figures go to figures/lost"
+    make, snakemake = pasted("figures/sharp/scenes/stream/fig1.pdf")
+    assert make[1:] == ["figures/sharp/scenes/stream/fig1.pdf", "WITH=config/what_if/sharp.yaml"]
+    assert snakemake[-2:] == ["--configfile", "config/what_if/sharp.yaml"]
+    (note, first, *_) = lineage._commands("figures/lost/fig1.pdf", here.project)
+    assert "figures/lost" in note and first == "  make figures/lost/fig1.pdf WITH=my.yaml"
+    # Two files, one of them with a blank and outside of config: a run wrote them down.
+    (here.project / "my roof.yaml").write_text("figures: figures/roof\n")
+    files = ["config/what_if/sharp.yaml", "my roof.yaml"]
+    overlays.note(here.project, {"figures": "figures/roof", "results": "results/roof"}, files)
+    make, snakemake = pasted("figures/roof/fig1.pdf")
+    assert shlex.split(make[2].removeprefix("WITH=")) == files
+    assert snakemake[-2:] == files
+    # What no longer leads there is not named.
+    (here.project / "my roof.yaml").write_text("figures: figures/else\n")
+    assert pasted("figures/roof/fig1.pdf")[0][2] == "WITH=my.yaml"
 
 
 def test_the_crate_describes_every_file_and_the_run(packed):

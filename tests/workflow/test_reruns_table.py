@@ -137,32 +137,60 @@ def test_plans_are_compared_as_snakemake_compares_them(finished, overlay):
     }
 
 
-def test_why_says_what_changed_and_what_follows(finished):
-    (finished.folder / "config/change.yaml").write_text("refinement: {max_offset: 0.7}\n")
-    overlays = ("--configfile", "config/quick.yaml", "config/change.yaml")
-    status, said = finished.dry_run(*overlays, "--", "figures/quick/fig7.pdf")
+def why(project: Project, monkeypatch, *arguments: str, durations: dict | None = None) -> list[str]:
+    """What `make why` says in a copy of the project, run with the library there."""
+    status, said = project.dry_run("--printshellcmds", *arguments)
     assert status == 0
+    monkeypatch.chdir(project.folder)
+    clock = TOOL["Clock"]([], durations or {})
+    return WHY["answer"](said, list(arguments), clock, project.library / "keystab")
+
+
+def test_why_says_what_changed_what_follows_and_what_is_overwritten(finished, monkeypatch):
+    (finished.folder / "config/change.yaml").write_text(
+        "refinement: {max_offset: 0.7}\nsets: {aliasing: {n_views: 3}}\n"
+    )
+    overlays = ("--configfile", "config/quick.yaml", "config/change.yaml")
     durations = {
         "Drawing figures/quick/fig7.pdf": 7.0,
         "Matching the keypoints of SIFT as shipped": 2,
     }
-    lines = list(WHY["in_lines"](WHY["jobs_and_reasons"](said), TOOL["Clock"]([], durations)))
-    assert lines[0].startswith("3 jobs would run, about ")
-    assert lines[1] == "Because refinement.max_offset was 0.6 and is 0.7:"
-    assert "  Matching the keypoints of SIFT as shipped (2 s)" in lines[2:4]
-    assert lines[4:] == ["After these:", "  Drawing figures/quick/fig7.pdf (7 s)"]
+    figures = ("--", "figures/quick/fig7.pdf", "figures/quick/fig10.pdf")
+    lines = why(finished, monkeypatch, *overlays, *figures, durations=durations)
+    offset = lines.index("Because refinement.max_offset was 0.6 and is 0.7:")
+    assert "  Matching the keypoints of SIFT as shipped (2 s)" in lines[offset + 1 : offset + 3]
+    after = lines.index("After these:")
+    assert "  Drawing figures/quick/fig7.pdf, and 1 like it (14 s)" in lines[after:]
+    # Both sets of the sweep, all that is different between their views, once.
+    assert [line for line in lines if "aliasing." in line or "shift" in line] == [
+        "Because sets.aliasing.n_views was 4 and is 3:"
+    ]
+    assert re.fullmatch("In results/quick and figures/quick are .*: [0-9]+ files would be overwritten.", lines[-2])  # fmt: skip
+    assert "into config/change.yaml: results, figures and logs" in lines[-1]
+
+
+def test_why_names_the_file_that_was_edited_and_another_picture(finished, monkeypatch):
     finished.edit(
         "src/keystab/evaluation/roc.py", "import annotations", "import annotations\nMORE = 1"
     )
+    quick = ("--configfile", "config/quick.yaml")
     edited = Project(finished.folder)
-    _, said = edited.dry_run("--configfile", "config/quick.yaml", "--", "figures/quick/fig5.pdf")
-    lines = list(WHY["in_lines"](WHY["jobs_and_reasons"](said), TOOL["Clock"]([], {})))
-    assert lines[1] == "Because code of keystab.stages.score_features changed:"
+    lines = why(edited, monkeypatch, *quick, "--", "figures/quick/fig5.pdf")
+    assert lines[1] == "Because src/keystab/evaluation/roc.py was edited:"
+    assert not any("overwritten" in line for line in lines)
+    (finished.folder / "my.yaml").write_text(
+        "reference: config/images/lake.png\nreference_sha256: null\n"
+    )
+    lines = why(finished, monkeypatch, *quick, "my.yaml", "--", "results/quick/views/still")
+    assert lines[1] == (
+        "Because another picture, config/images/lake.png in place of config/images/coldwarm.png:"
+    )
+    assert lines[3].startswith("In results/quick and figures/quick are results of config/images/c")
 
 
 def test_why_stays_short():
-    jobs = [(f"{word} 1", "Missing output files: a") for word in "abcdefghijklmnop"]
-    jobs += [(f"Detecting {n}", "Code has changed since last execution") for n in range(90)]
+    jobs = [(f"{word} 1", "a is missing") for word in "abcdefghijklmnop"]
+    jobs += [(f"Detecting {n}", "the rule has another command") for n in range(90)]
     lines = list(WHY["in_lines"](jobs, TOOL["Clock"]([], {})))
     assert lines[-2:] == [
         "Because the rule has another command:",

@@ -145,7 +145,13 @@ def test_a_scene_that_is_not_in_the_settings_is_refused(planned):
     status, said = planned.dry_run(
         "--configfile", "config/quick.yaml", "--", "results/quick/scenes/roof/claims.csv"
     )
-    assert status != 0 and "MissingRuleException" in said
+    assert status != 0 and "/claims.csv: there is no scene 'roof'; there are " in said
+
+
+def test_what_no_rule_makes_is_said_with_where_it_is_made(planned):
+    status, said = planned.dry_run(*QUICK, "--", "figures/fig12.pdf")
+    line = "error: figures/fig12.pdf: these settings draw into figures/quick: type figures/quick/fig12.pdf"
+    assert status != 0 and any(each.startswith(line) for each in said.splitlines())
 
 
 def test_a_change_of_the_view_of_the_default_scene_touches_no_other(finished):

@@ -24,7 +24,7 @@ rule claims:
     benchmark:
         f"{BENCHMARK}claims.tsv"
     params:
-        **stage("check_claims"),
+        **stage("check_claims", "reference", "draft", told={"settings": LAID_OVER}),
         criteria=parameter("criteria", hashlib.sha256(repr(CLAIMS).encode()).hexdigest()),
     message:
         "Judging the claims of the paper{params.scene}"

@@ -21,6 +21,7 @@ from keystab.study import (
     feasibility,
     floor_variants,
     job_resources,
+    overlays,
     plan,
     scenes,
     settings,
@@ -40,7 +41,8 @@ try:
     settings.merge(given, config)  # has it already, but for a module's and with -d
     schema = read_plain_yaml(FILES.own("workflow/schemas/config.schema.yaml"))
     config.update(FILES.with_pictures(settings.checked(given, schema)))
-    feasibility.require(config)
+    by_hand = overlays.of_a_person(workflow.basedir, workflow.overwrite_configfiles)
+    feasibility.require(config, written=settings.read_yaml(*by_hand))
     CLAIMS = read_claims(FILES.own("config/claims.yaml"))
     CORPUS = FILES.with_photographs(corpus.read_corpus(FILES.own("config/scenes.csv")))
     CLAIMED = [f"{name}.csv" for name in table_names(CLAIMS)]
@@ -55,6 +57,7 @@ RESULTS = config["results"]
 HERE = f"{RESULTS}/{{place}}"
 DRAWN = f"{config['figures']}/{{place}}"
 LOG = f"{config['logs']}/{{place}}"
+LAID_OVER = overlays.names_of(Path.cwd(), ["config/config.yaml", *workflow.overwrite_configfiles])
 BENCHMARK = f"{config['logs']}/benchmarks/{{place}}"
 
 
@@ -87,6 +90,7 @@ os.environ.update(PATH=os.pathsep.join([str(Path(sys.executable).parent), *os.ge
 
 
 onstart:
+    overlays.note(Path.cwd(), config, workflow.overwrite_configfiles)
     # Tells a killed run's lock from that of a run on another machine; see tools/interrupted.py.
     Path(".snakemake/host").write_text(platform.node())
     # Snakemake 9 limits the rate at which jobs start to 100 a second, and for that wakes up once a

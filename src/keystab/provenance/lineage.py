@@ -14,13 +14,13 @@ from keystab.io.figure_metadata import PNG_KEY, FigureMetadata
 from keystab.provenance.code_digest import fingerprint
 from keystab.provenance.imported_software import software_digest, software_problems
 from keystab.provenance.snakemake_records import Record, read_records, settings_behind, upstream
-from keystab.study.result_folders import normal_folder
-from keystab.study.settings import read_yaml
+from keystab.study.overlays import on_command_line, overlays_of
 
 __all__ = ["code_of_figure", "file_digest", "printable", "read_figure_metadata", "whence"]
 
 _SHORT = 12
 _MOST_PIXELS = 100_000_000
+_OF_SCENE = re.compile("/scenes/[^/]+$")
 _ESCAPE = re.compile(rb"\\([0-7]{1,3}|.)", re.DOTALL)
 _KEYWORDS_START = b"/Keywords ("
 _KEYWORDS = re.compile(rb"/Keywords \(((?:[^()\\]|\\.)*)\)", re.DOTALL)
@@ -186,7 +186,8 @@ def _told(path: Path, project: Path) -> list[str]:
         lines.append(f"  {table}  {digest}  {_state(project / table, digest)}")
     if drawn is None:
         lines += ["", "the records of Snakemake here know no such figure, nor what lies behind it"]
-        return [*lines, "", "to make it again", f"  make figures/{metadata.figure}.pdf"]
+        lines += ["", f"to make one at the settings of the project, in {project}"]
+        return [*lines, f"  make figures/{metadata.figure}.pdf"]
     chain = upstream(records, [drawn.output])
     behind = [record for record in chain if record is not drawn]
     lines += ["", "which were made from, and these in turn from"]
@@ -194,8 +195,9 @@ def _told(path: Path, project: Path) -> list[str]:
     settings = settings_behind(behind)
     lines += ["", f"settings behind it ({len(settings)})"]
     lines += [f"  {name} = {value}" for name, value in settings.items()]
-    lines += ["", "drawn with", f"  {drawn.command}", "", "to make it again, with all behind it"]
-    return [*lines, *(f"  {line}" for line in _commands(drawn.output, project))]
+    lines += ["", "drawn with", f"  {drawn.command}", ""]
+    lines += [f"to make it again, with all behind it, in {project}"]
+    return [*lines, *_commands(drawn.output, project)]
 
 
 def _identity(metadata: FigureMetadata, project: Path) -> Iterator[str]:
@@ -250,24 +252,14 @@ def _state(path: Path, digest: str) -> str:
 
 
 def _commands(output: str, project: Path) -> Iterator[str]:
-    """Commands that make a figure, with the settings whose figures go to its folder."""
-    folder = Path(output).parent.as_posix()
+    """Commands that make a figure, each on a line of its own, so that it can be pasted."""
+    folder = _OF_SCENE.sub("", Path(output).parent.as_posix())
+    files = overlays_of(project, folder)
+    if files is None:
+        yield f"(no settings found here whose figures go to {folder}: give theirs for my.yaml)"
+    known = ["my.yaml"] if files is None else files
+    of_make = [] if known == ["config/quick.yaml"] else known  # then the target says it
     quoted = shlex.quote(output)
-    yield f"make {quoted}{_overlay(folder, project, ' WITH=', 'make')}"
-    overlay = _overlay(folder, project, " --configfile ", "snakemake")
-    yield f"or, after `. .venv/bin/activate`: snakemake {quoted} -j2{overlay}"
-
-
-def _overlay(folder: str, project: Path, flag: str, tool: str) -> str:
-    """Flag that lays the right settings over those of the project."""
-    files = sorted(project.glob("config/**/*.yaml"))
-    for file in files:
-        try:
-            figures = read_yaml(file).get("figures")
-        except InputError:  # not of this figure, whatever else it is
-            continue
-        if isinstance(figures, str) and normal_folder(figures, project) == folder:
-            name = file.relative_to(project).as_posix()
-            known = name == "config/config.yaml" or (tool == "make" and folder == "figures/quick")
-            return "" if known else f"{flag}{name}"
-    return f"{flag}the settings whose figures go to {folder}"
+    yield f"  make {quoted}{on_command_line(of_make, make=True)}"
+    yield "or, after `. .venv/bin/activate`"
+    yield f"  snakemake {quoted} -j2{on_command_line(known, make=False)}"

@@ -131,6 +131,8 @@ Theory
 Claims and results
     claims : file of claims
     tables : tables that claims need
+    draft : whether the run is a draft
+    settings : files of settings, for the reader
     verdicts : verdicts on each picture, CSV
     families : family of each scene
     over_scenes : table of what claims are over scenes

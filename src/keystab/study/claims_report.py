@@ -5,17 +5,33 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from keystab._version import __version__
+from keystab.errors import InputError
+from keystab.study.claims import read_claims, table_names
 from keystab.study.decisions import LEVEL
-from keystab.study.verdicts import UNTESTED, VERDICTS, Outcome, tally
+from keystab.study.verdicts import UNTESTED, VERDICTS, Outcome, outcomes_of, tally
 from keystab.utils.files import written_whole
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["FIELDS", "cell", "records", "to_json", "to_markdown", "to_table", "write_report"]
+__all__ = [
+    "FIELDS",
+    "cell",
+    "heading",
+    "judged",
+    "records",
+    "to_json",
+    "to_markdown",
+    "to_table",
+    "without_heading",
+    "write_report",
+]
 
 #: What is said of every claim, in this order.
 FIELDS = (
@@ -23,6 +39,53 @@ FIELDS = (
     *("value", "interval", "paper", "verdict", "note"),
     *("uncertainty", "by_numbers", "p", "p_holm"),
 )
+
+
+def judged(claims: Path, tables: Iterable[Path]) -> list[Outcome]:
+    """Verdicts that tables give on the claims of a file.
+
+    Raises
+    ------
+    InputError
+        If a table is missing that the claims ask for.
+    """
+    from keystab.io.tables import read_table
+
+    asked, files = read_claims(claims), {path.stem: path for path in tables}
+    lacking = [f"{name}.csv" for name in table_names(asked) if name not in files]
+    if lacking:
+        raise InputError(f"{claims} asks for {', '.join(lacking)}: name them with --tables")
+    return outcomes_of(asked, {name: read_table(files[name]) for name in table_names(asked)})
+
+
+def heading(reference: str, settings: Sequence[str], draft: bool) -> str:
+    """One line that says which run verdicts are of.
+
+    Parameters
+    ----------
+    reference : str
+        Picture.
+    settings : sequence of str
+        Files of settings, later ones laid over earlier ones.
+    draft : bool
+        Whether the run is a draft.
+
+    Examples
+    --------
+    >>> heading("roof.png", ["config/config.yaml", "my.yaml"], True)  # doctest: +ELLIPSIS
+    '*Draft.* Picture: `roof.png`. Settings: `config/config.yaml`, `my.yaml`. Version: keystab ...'
+    """
+    files = ", ".join(f"`{name}`" for name in settings)
+    mark = "*Draft.* " if draft else ""
+    return f"{mark}Picture: `{reference}`. Settings: {files}. Version: keystab {__version__}."
+
+
+_HEADING = re.compile(r"(?<=\n\n)(?:\*Draft\.\* )?Picture: .*\n\n")
+
+
+def without_heading(markdown: str) -> str:
+    """Verdicts for people without the line of `heading`: the same for the same tables."""
+    return _HEADING.sub("", markdown, count=1)
 
 
 def records(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
@@ -128,13 +191,21 @@ def _short(value: float | str | None) -> str:
     return f"{value:.0f}" if value == round(value) else f"{value:.4g}"
 
 
-def to_markdown(outcomes: Sequence[Outcome]) -> str:
-    """Write the verdicts for people: how many verdicts of each kind, then the claims by verdict."""
+def to_markdown(outcomes: Sequence[Outcome], head: str = "") -> str:
+    """Write the verdicts for people: how many verdicts of each kind, then the claims by verdict.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+    head : str, optional
+        Line that says which run they are of (`heading`).
+    """
     table = to_table(outcomes)
     counts = tally(outcomes)
     lines = [
         "# What the paper says, and what this run says of it",
         "",
+        *([head, ""] if head else []),
         "Every claim was given a criterion from the paper's words. `claims.csv` and `claims.json`",
         "hold the same with all criteria; `config/claims.yaml` says how each number is computed.",
         "",
@@ -195,11 +266,13 @@ def write_report(
     csv: str | os.PathLike[str],
     json_file: str | os.PathLike[str],
     markdown: str | os.PathLike[str],
+    *,
+    head: str = "",
 ) -> None:
-    """Write the verdicts as a table, as JSON and for people; each file whole or not at all."""
+    """Write the verdicts as a table, as JSON and, under a head, for people; each file whole."""
     from keystab.io.tables import write_table
 
     write_table(to_table(outcomes), csv)
-    for path, text in ((json_file, to_json(outcomes)), (markdown, to_markdown(outcomes))):
+    for path, text in ((json_file, to_json(outcomes)), (markdown, to_markdown(outcomes, head))):
         with written_whole(path) as part:
             part.write_text(text, encoding="utf-8", newline="")

@@ -38,7 +38,7 @@ SWEPT_SETS = {
 """Sweeps of sets of views that are searched: what is made of them, and what they differ in."""
 
 
-def require(settings: Settings, folder: Path | str = ".") -> None:
+def require(settings: Settings, folder: Path | str = ".", written: Settings | None = None) -> None:
     """Raise unless the study can be run.
 
     Parameters
@@ -47,6 +47,9 @@ def require(settings: Settings, folder: Path | str = ".") -> None:
         Complete settings, see `keystab.study.settings.checked`.
     folder : path
         Folder that relative paths in the settings start from.
+    written : dict, optional
+        Of these, what a person wrote; by default all. What does not fit a picture is then said of
+        the picture, unless the person wrote it.
 
     Raises
     ------
@@ -55,7 +58,7 @@ def require(settings: Settings, folder: Path | str = ".") -> None:
     """
     refuse(path_problems(settings, Path(folder)))
     try:
-        _require(settings, Path(folder))
+        _require(settings, Path(folder), written)
     except (ArithmeticError, RecursionError) as error:
         raise InputError(
             f"config: the settings lead to numbers that cannot be computed ({error}); "
@@ -63,10 +66,22 @@ def require(settings: Settings, folder: Path | str = ".") -> None:
         ) from None
 
 
-def _require(settings: Settings, folder: Path) -> None:
+def _require(settings: Settings, folder: Path, written: Settings | None) -> None:
     refuse(sweep_problems(settings))
+    by_hand = None if written is None else _sized_by_hand(settings["sets"], written)
     settings = {**settings, "sets": expanded(settings["sets"])}
-    refuse(setting_problems(settings) or picture_problems(settings, folder))
+    refuse(setting_problems(settings) or picture_problems(settings, folder, by_hand))
+
+
+def _sized_by_hand(sets: Settings, written: Settings) -> set[str]:
+    """Sets of views, members of sweeps too, whose size a person gave."""
+    given = {name: views or {} for name, views in written.get("sets", {}).items()}
+    sized = {name for name, views in given.items() if _SIZES & views.keys()}
+    return {*expanded({name: views for name, views in sets.items() if name in sized})}
+
+
+_SIZES = {"step", "height", "width", "guard", "zoom", "whole", "shift_spread", "rotation_spread"}
+"""Settings of a set of views that decide what part of a picture they show."""
 
 
 def sweep_problems(settings: Settings) -> list[str]:

@@ -6,8 +6,9 @@ Every check is a plain function that returns one line per problem.
 from __future__ import annotations
 
 import math
+import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -62,33 +63,46 @@ def still_blur(settings: Settings) -> float:
     return effective_blur(still["blur"][0], still["step"][0], settings["reference_blur"])
 
 
-def picture_problems(settings: Settings, folder: Path) -> list[str]:
-    """One line for everything that the reference picture or the disk is too small for."""
+def picture_problems(
+    settings: Settings, folder: Path, by_hand: Collection[str] | None = None
+) -> list[str]:
+    """One line for everything that the reference picture or the disk is too small for.
+
+    Parameters
+    ----------
+    settings : dict
+        Complete settings; sweeps are expanded.
+    folder : path
+        Folder that relative paths in them start from.
+    by_hand : collection of str, optional
+        Sets of views whose size a person gave: where one does not fit, it is named. Where others do
+        not, the picture is too small. By default all count as given.
+    """
     try:
         shape = picture_shape(folder / settings["reference"])
     except InputError as error:
         return [f"reference: {error}"]
     border = settings["comparison"]["border"]
-    problems = [
-        line
+    problems = {
+        name: lines
         for name, views in settings["sets"].items()
-        for line in fit_problems(name, views, shape, border)
-    ]
+        if (lines := fit_problems(name, views, shape, border))
+    }
     if 2 * len(problems) > len(settings["sets"]):  # not the sets are to blame
         of_border = _border_problems(settings["sets"], shape, border)
         if of_border:
             return of_border
-    problems += further_picture_problems(settings, folder)
-    if problems:
-        return problems
-    problems = [
-        line
+    found = _whose_fault(problems, settings, shape, by_hand)
+    found += further_picture_problems(settings, folder)
+    if found:
+        return found
+    problems = {
+        name: lines
         for name, views in settings["sets"].items()
-        if views["n_spo"]
-        for line in common_problems(name, views, shape, settings)
-    ]
+        if views["n_spo"] and (lines := common_problems(name, views, shape, settings))
+    }
     if problems:
-        return problems
+        return _whose_fault(problems, settings, shape, by_hand)
     try:
         planned = samplings(settings, view_shapes(settings["sets"]["still"], shape)[0])
     except InputError as error:
@@ -112,6 +126,91 @@ def picture_problems(settings: Settings, folder: Path) -> list[str]:
             f"{settings['results']}: keep fewer, or none with keep_scale_spaces: false"
         ]
     return []
+
+
+def _whose_fault(
+    problems: Mapping[str, list[str]],
+    settings: Settings,
+    shape: tuple[int, int],
+    by_hand: Collection[str] | None,
+) -> list[str]:
+    """Lines on sets that do not fit; one on the picture, where no person gave their sizes."""
+    own = problems if by_hand is None else problems.keys() & by_hand
+    lines = [line for name in problems if name in own for line in problems[name]]
+    others = {name: views for name, views in settings["sets"].items() if name not in own}
+    if len(own) == len(problems):
+        return lines
+    least, sets = least_shape(others, settings)
+    if all(size >= needed for size, needed in zip(shape, least, strict=True)):
+        return [line for each in problems.values() for line in each]  # a larger one would not do
+    return [
+        f"picture too small: {settings['reference']} has {shape[0]} x {shape[1]} pixels (height x "
+        f"width), these settings need at least {least[0]} x {least[1]}; give a larger one, or a "
+        f"smaller step, height or width of {' and '.join(f'sets.{name}' for name in sets)}",
+        *lines,
+    ]
+
+
+def least_shape(sets: Settings, settings: Settings) -> tuple[tuple[int, int], list[str]]:
+    """Height and width of the smallest reference that sets of views fit, and what asks for them.
+
+    Parameters
+    ----------
+    sets : mapping
+        Sets of views by name, without sweeps.
+    settings : mapping
+        Complete settings.
+
+    Returns
+    -------
+    shape : tuple of int
+        Where views also need a common field, the smallest of these proportions.
+    names : list of str
+        The sets, at most one per side, that would not fit a smaller one.
+    """
+    most, sizes = [], []
+    for side in ("height", "width"):
+        border = settings["comparison"]["border"]
+        needed = {name: _least_side(views, side, border) for name, views in sets.items()}
+        most.append(max(needed, key=needed.__getitem__))
+        sizes.append(needed[most[-1]])
+    shape = (sizes[0], sizes[1])
+    searched = {name: views for name, views in sets.items() if views["n_spo"]}
+
+    def alone(percent: int) -> list[str]:
+        """Sets that have nothing in common in a picture of these proportions."""
+        larger, found = _scaled(shape, percent), []
+        for name, views in searched.items():
+            try:
+                found += [name] if common_problems(name, views, larger, settings) else []
+            except InputError:  # a tilted view that sees the horizon
+                found.append(name)
+        return found
+
+    if lone := alone(100):
+        most = lone[:1]
+        tens = next((it for it in range(110, 401, 10) if not alone(it)), 100)
+        percent = next((it for it in range(tens - 9, tens) if not alone(it)), tens)
+        shape = _scaled(shape, percent)
+    # Members of a sweep share their size, which is given once for all.
+    return shape, list(dict.fromkeys(_OF_SWEEP.sub("", name) for name in most))
+
+
+_OF_SWEEP = re.compile(r"_\d[\dp]*$")
+
+
+def _least_side(views: Settings, side: str, border: float) -> int:
+    """Least side of a reference that all views of a set fit; see `fit_problems`."""
+    step, given = max(per_view(views)["step"]), views[side]
+    pixels = math.ceil(2 * border) + 3 if given is None else given - 2 * views["guard"]
+    size = max(math.ceil(pixels * step) - 1, 1)
+    while int(size / step) < pixels:  # as views are cut, rounding included
+        size += 1
+    return size
+
+
+def _scaled(shape: tuple[int, int], percent: int) -> tuple[int, int]:
+    return -(-shape[0] * percent // 100), -(-shape[1] * percent // 100)
 
 
 def _border_problems(sets: Settings, shape: tuple[int, int], border: float) -> list[str]:

@@ -11,6 +11,7 @@ import os
 import shlex
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
+from types import MappingProxyType
 from typing import Any, get_type_hints
 
 from keystab.study.plan import sets_of_figure, setting
@@ -203,7 +204,13 @@ class Rules:
         return amount
 
     def stage(
-        self, stage: str, /, *blocks: type | str, of_set: str = "", **given: Any
+        self,
+        stage: str,
+        /,
+        *blocks: type | str,
+        of_set: str = "",
+        told: Settings = MappingProxyType({}),
+        **given: Any,
     ) -> dict[str, Callable[..., Any]]:
         """Parameters of a rule whose job is a stage.
 
@@ -217,6 +224,8 @@ class Rules:
             of those of the wildcard ``sweep``.
         of_set : str, optional
             The set where no wildcard says it.
+        told : mapping, optional
+            Further options, which change no number: Snakemake does not compare them.
         **given
             Options that are no setting, or have another value: functions of wildcards, or values.
 
@@ -229,6 +238,7 @@ class Rules:
         """
         module = f"keystab.stages.{stage}"
         places = options(*blocks)
+        given = {**given, **told}
         values = {
             option: self._parameter(
                 places.get(option, option), of_set, given.get(option, _IN_PLACE)
@@ -242,7 +252,7 @@ class Rules:
 
         parameters: dict[str, Callable[..., Any]] = dict(values)
         for option, value in given.items():
-            if isinstance(value, str) and "{" in value:  # the path of the output says it already
+            if option in told or (isinstance(value, str) and "{" in value):  # the path says it
                 parameters[option] = _derived(values[option])
         return {**parameters, **self.made_with(module), "command": command, "scene": self._scene}
 
