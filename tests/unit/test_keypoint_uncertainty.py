@@ -202,7 +202,8 @@ def test_slopes_of_a_quartic_are_differences_of_its_values():
 
     at, h = np.array([0.3, -0.2, 0.4]), 1e-3
     gradient, hessian = np.empty(3), np.empty((3, 3))
-    _slopes(jet, -2.0, at, gradient, hessian)
+    work = np.empty(10), np.empty(10), np.empty(6)
+    _slopes(jet, -2.0, at, *work, gradient, hessian)
     for i, a in enumerate(h * np.eye(3)):
         assert gradient[i] == pytest.approx(
             -2 * (value(at + a) - value(at - a)) / (2 * h), abs=1e-5
@@ -219,7 +220,7 @@ def one_way_cubic(slope, curvature, third):
     jet[0, 9], jet[0, 19] = -curvature, third
     noise = np.zeros((1, len(ORDERS), len(ORDERS)))
     noise[0, 3, 3] = slope**2
-    return jet, np.ones(1), noise, np.full((1, 2), 0.05)
+    return jet, np.ones(1), noise, np.array([[0.05, 0.05, 0.0, 0.0, 0.0]])
 
 
 def test_without_a_fold_in_reach_the_shift_is_the_gradient_over_the_curvature():
@@ -264,6 +265,36 @@ def test_a_saddle_counts_where_all_neighbours_lie_on_its_steep_sides(angle, seen
     jet[0, 7], jet[0, 8], jet[0, 9] = hessian[0, 0], hessian[0, 1], hessian[1, 1]
     outcome = after_noise(jet, sign, np.zeros((1, len(ORDERS), len(ORDERS))), grid)
     assert outcome.survival[0] == seen
+
+
+def tops_its_neighbours(hessian, steps, off):
+    """Whether a sample within two steps of the nearest is a strict maximum of a quadratic form."""
+    axes = [
+        (np.arange(-3, 4) + (c - np.rint(c))) * step for c, step in zip(off, steps, strict=True)
+    ]
+    at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    value = np.einsum("...i,ij,...j->...", at, hessian, at)
+    around = np.ones((3, 3, 3), dtype=bool)
+    around[1, 1, 1] = False
+    others = ndimage.maximum_filter(value, footprint=around)
+    return bool((value > others)[1:-1, 1:-1, 1:-1].any())
+
+
+def test_a_saddle_counts_where_a_sample_of_the_grid_tops_its_neighbours():
+    draw = np.random.default_rng(11)
+    n, steps = 400, (0.05, 0.08, 0.08)
+    jets, off = np.zeros((n, len(ORDERS))), draw.uniform(-0.6, 0.6, (n, 3))
+    axes = np.linalg.qr(draw.standard_normal((n, 3, 3)))[0]
+    curvature = -np.abs(draw.uniform(0.5, 2.0, (n, 3)))
+    curvature[:, 0] = draw.uniform(0.0, 0.1, n)  # up along one direction: a saddle
+    hessians = np.einsum("nik,nk,njk->nij", axes, curvature, axes)
+    jets[:, 4:10] = hessians[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+    grid = np.column_stack([np.tile(steps[:2], (n, 1)), off])
+    nothing = np.zeros((n, len(ORDERS), len(ORDERS)))
+    said = after_noise(jets, np.ones(n), nothing, grid).survival
+    seen = [tops_its_neighbours(h, steps, o) for h, o in zip(hessians, off, strict=True)]
+    assert 0.1 < np.mean(seen) < 0.9
+    assert said.tolist() == [float(one) for one in seen]
 
 
 # -------------------------------------------------------------------------------------------------

@@ -18,7 +18,12 @@ DOCUMENTED = {"_replace", "_asdict", "_fields", "_make"}
 NO_PUBLIC_WAY = {
     ("tools/reruns.py", name): "Snakemake has no public name for its plan and for what it compares"
     for name in ("_workflow", "_code", "_params", "_input")
-}
+} | {
+    ("tools/reference_pages.py", name): "argparse has no public name for what a parser takes"
+    for name in (
+        "_actions", "_expand_help", "_get_formatter", "_HelpAction", "_SubParsersAction",
+    )
+}  # fmt: skip
 
 # What is called `attrs` there belongs to groups and arrays of Zarr, which write it down.
 OF_ZARR = {

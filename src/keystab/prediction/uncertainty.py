@@ -3,7 +3,7 @@ r"""Error bars of every keypoint of a picture, and whether it can be expected to
 White noise of variance :math:`s^2` moves an extremum of the difference of Gaussians w with the
 Hessian H by :math:`\delta = -H^{-1} g`, g the gradient of the noise's own difference of Gaussians,
 as long as the shift is small. Where it is not, extrema appear and vanish. Both are had from one
-model of all derivatives up to the third order: `keystab.prediction.survival`.
+model of all derivatives up to the fourth order: `keystab.prediction.survival`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from keystab.scalespace.dog import checked_image
 from keystab.scalespace.sampling import balanced_delta
 from keystab.utils import validation
 from keystab.utils.grey_values import grey_unit
+from keystab.utils.one_thread import one_thread
 from keystab.utils.progress import progress_if_watched
 
 __all__ = ["keypoint_uncertainty"]
@@ -171,12 +172,13 @@ def keypoint_uncertainty(
     sampling = (n_spo, delta_min or balanced_delta(n_spo, kappa, sigma_min), sigma_min, refine)
     jets, level = _at_keypoints(array / unit, keypoints, camera_blur, kappa, model)
     batches = range(0, len(keypoints), _BATCH)
-    for start in progress_if_watched(batches, len(batches), "error bars"):
-        rows = slice(start, start + _BATCH)
-        seen = keypoints.iloc[rows], jets[rows], level[rows]
-        part = _error_bars(*seen, camera_blur, kappa, sampling, noise_free)
-        for name, values in part.items():
-            columns[name][rows] = values
+    with one_thread():  # of matrices of 35 x 35: more threads took four times the processor's time
+        for start in progress_if_watched(batches, len(batches), "error bars"):
+            rows = slice(start, start + _BATCH)
+            seen = keypoints.iloc[rows], jets[rows], level[rows]
+            part = _error_bars(*seen, camera_blur, kappa, sampling, noise_free)
+            for name, values in part.items():
+                columns[name][rows] = values
     columns["noise"] *= unit
     return keypoints.assign(**columns)
 
@@ -252,8 +254,15 @@ def _error_bars(
     covariance = noise_jets(scale, camera_blur, kappa) * level[:, None, None] ** 2
     n_spo, delta_min, sigma_min, refined = sampling
     octave = keypoints["octave"].to_numpy(dtype=np.int64)
+    step = delta_min * 2.0**octave
     grid = np.column_stack(
-        [np.full(sigma.size, np.log(2) / n_spo), delta_min * 2.0**octave / sigma]
+        [
+            np.full(sigma.size, np.log(2) / n_spo),
+            step / sigma,
+            keypoints["s"] - n_spo * (np.log2(sigma / sigma_min) - octave),
+            keypoints["row"] - keypoints["y"] / step,
+            keypoints["column"] - keypoints["x"] / step,
+        ]
     )
     survival = np.empty(len(keypoints))
     moments = np.empty((len(keypoints), 3, 3))
