@@ -46,4 +46,4 @@ rule all:
 # Of a file that no rule makes, Snakemake says no more than that.
 if workflow.modifier.is_main_snakefile():
     FINAL = plan.final_files("", RESULTS, config["figures"], CLAIMED)
-    logger.addFilter(Offered(STUDY, SCENES, workflow.rules, FINAL).explain)
+    Offered(STUDY, SCENES, workflow.rules, FINAL).listen(logger)

@@ -19,9 +19,9 @@ IN_VIEWS = (
 rule match_views:
     """Figures 7, 8, S1, S5: stability and precision across views of the scene."""
     input:
+        **detections(plan.searches_of_figure, "{figure}"),
         views=ancient(files("views/{}", plan.sets_of_figure, "{figure}")),
         views_digest=files("views/{}.sha256", plan.sets_of_figure, "{figure}"),
-        **detections(plan.searches_of_figure, "{figure}"),
     output:
         curves=f"{HERE}tables/{{figure}}_curves.csv",
         precision=f"{HERE}tables/{{figure}}_precision.csv",
@@ -56,9 +56,9 @@ rule match_views:
 rule match_translations:
     """Beside figure 8: stability under translations, in the range of scales that all zooms cover."""
     input:
+        **detections(plan.searches, "translations_wide"),
         views=ancient(files("views/{set}", plan.searches, "translations_wide")),
         views_digest=files("views/{set}.sha256", plan.searches, "translations_wide"),
-        **detections(plan.searches, "translations_wide"),
     output:
         curves=f"{HERE}tables/fig8_translations.csv",
         counts=f"{HERE}tables/fig8_translations_counts.csv",
@@ -147,9 +147,9 @@ rule match_kappas:
 rule match_aliasing:
     """Figure 10: stability across views against the blur of the camera."""
     input:
+        **detections(plan.searches_of_figure, "{figure}"),
         views=ancient(files("views/{}", plan.sets_of_figure, "{figure}")),
         views_digest=files("views/{}.sha256", plan.sets_of_figure, "{figure}"),
-        **detections(plan.searches_of_figure, "{figure}"),
     output:
         curves=f"{HERE}tables/{{figure}}_curves.csv",
         counts=f"{HERE}tables/{{figure}}_counts.csv",
@@ -196,9 +196,9 @@ use rule match_aliasing as match_sweep with:
 rule match_blur_zooms:
     """Figure S2: keypoints of the first view in those at other zooms, under right and wrong blurs."""
     input:
+        **detections(plan.searches_of_sweep, "{sweep}"),
         views=ancient(files("views/{set}", plan.searches_of_sweep, "{sweep}")),
         views_digest=files("views/{set}.sha256", plan.searches_of_sweep, "{sweep}"),
-        **detections(plan.searches_of_sweep, "{sweep}"),
     output:
         curves=f"{HERE}tables/{{sweep}}_curves.csv",
         counts=f"{HERE}tables/{{sweep}}_counts.csv",

@@ -127,8 +127,8 @@ rule noise_theory:
 rule view_statements:
     """Statements on the camera and on single views: aliasing, wrong blurs, zooms, noise."""
     input:
-        reference=local(of(plan.setting, "reference")),
         **views("still"),
+        reference=local(of(plan.setting, "reference")),
     output:
         aliasing=f"{HERE}tables/aliasing_energy.csv",
         wrong_blur=f"{HERE}tables/wrong_blur_identity.csv",

@@ -39,8 +39,8 @@ rule find_true_extrema:
 rule find_scene_extrema:
     """Find the true extrema of the scene, as a view of the whole of it should see them."""
     input:
-        reference=local(of(plan.setting, "reference")),
         **views("still"),
+        reference=local(of(plan.setting, "reference")),
     output:
         table=f"{HERE}truth/scene.parquet",
     log:
@@ -172,10 +172,10 @@ rule evaluate_views:
     """Figure truth: recall and precision of sets of views against the scene itself."""
     input:
         **views("still"),
+        **detections(plan.compared_with_scene),
         truth=f"{HERE}truth/scene.parquet",
         sets=ancient(files("views/{set}", plan.compared_with_scene)),
         sets_digest=files("views/{set}.sha256", plan.compared_with_scene),
-        **detections(plan.compared_with_scene),
     output:
         table=f"{HERE}tables/truth_views.csv",
     log:

@@ -27,14 +27,13 @@ A detector looks at the 26 neighbours of a sample, so that it takes a saddle for
 a sample tops all of these, as along a ridge askew to the grid. A stationary point of an indefinite
 Hessian therefore counts where a sample of the quartic near it is such an extremum, on the grid of
 the detector as it lies about the keypoint. Of keypoints that are saddles the samples about them are
-asked as well where the climb finds nothing. In a shot from another place the grid lies elsewhere,
-and a saddle returns less often than is said.
+asked as well where the climb finds nothing. Seen from another place, on another grid, fewer return.
 
-One thing is left out, and seen: *what kind of scene it is*, the spectrum's exponent of 2 and its
-being the same in all directions. Seen through noise an eighth of their amplitude, Gaussian fields
-of exponent 3 return more than a cubic said, and made strokes less. With the right exponent half of
-the former error is gone; the exponent under which the jets of ``street`` are likeliest, some 3,
-makes its error larger (0.077 for 0.068), because its edges have one direction: so none is inferred.
+Left out, and seen: *what kind of scene it is*, the spectrum's exponent of 2 and its being the same
+in all directions. Seen through noise an eighth of their amplitude, Gaussian fields of exponent 3
+return more than a cubic said, made strokes less. With the right exponent half of the former is
+gone; that under which the jets of ``street`` are likeliest, some 3, makes its error larger (0.077
+for 0.068), because its edges have one direction: so none is inferred.
 """
 
 from __future__ import annotations

@@ -43,6 +43,13 @@ class Offered:
     files: Sequence[str]
     project: Path = Path()
 
+    def listen(self, logger: logging.Logger) -> None:
+        """Hear what Snakemake logs, in place of those of workflows that this process read before."""
+        for heard in list(logger.filters):
+            if type(getattr(heard, "__self__", None)).__name__ == type(self).__name__:
+                logger.removeFilter(heard)
+        logger.addFilter(self.explain)
+
     def explain(self, record: logging.LogRecord) -> bool:
         """Put what Snakemake logs of a wrong target into a person's words; a filter of its log."""
         kind, said = getattr(record, "exception", ""), record.getMessage()
