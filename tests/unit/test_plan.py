@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from keystab.camera.view_sets import per_view, view_shapes, view_specs
 from keystab.study import floor_variants, job_resources, plan, scenes, settings
+from keystab.study.claims import read_claims, table_names
 from keystab.study.plain_yaml import read_plain_yaml
 
 ROOT = Path(__file__).parents[2]
@@ -322,6 +323,13 @@ def test_a_scene_ends_in_its_figures_tables_and_verdicts_and_shares_what_shows_n
     drawn_once = {"fig1", "figS3", "figS4", "predictors"}
     assert {name for name, figure in plan.FIGURES.items() if not figure.of_scene} == drawn_once
     assert len([path for path in own if path.startswith("f/")]) == 2 * len(plan.FIGURES)
+
+
+def test_all_tables_that_a_study_writes_are_among_what_it_ends_in():
+    claimed = [f"{name}.csv" for name in table_names(read_claims(ROOT / "config/claims.yaml"))]
+    final = {Path(path).name for path in plan.final_files("", "r", "f", claimed)}
+    written = {path.name for path in (ROOT / "results/reference/tables").glob("*.csv")}
+    assert len(written) > 80 and written <= final
 
 
 # What jobs may take

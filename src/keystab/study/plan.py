@@ -112,7 +112,11 @@ FIGURES = {
 STATED_SWEEPS = {"blur_zooms": "assumed_blur", "unbalanced": "delta_min", "large_scales": "noise"}
 """Sweeps of sets of views that answer statements of the text, and what their sets differ in."""
 
-TABLES_NOT_DRAWN = ("fig8_translations.csv", "refinement.csv")
+TABLES_NOT_DRAWN = (
+    *("fig8_translations.csv", "figS5_curves.csv", "refinement.csv"),
+    *(f"{it}_{of}.csv" for it in ("blur_zooms", "large_scales") for of in ("counts", "curves")),
+    *("unbalanced_counts.csv", "unbalanced_curves.csv"),
+)
 """Tables of a scene that no figure draws and no claim needs."""
 
 TABLES_OF_THEORY = ("fig1_samplings.csv", "figS3_ranges.csv")
