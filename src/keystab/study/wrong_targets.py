@@ -44,7 +44,7 @@ class Offered:
     project: Path = Path()
 
     def listen(self, logger: logging.Logger) -> None:
-        """Hear what Snakemake logs, in place of those of workflows that this process read before."""
+        """Hear what Snakemake logs, and let those of workflows read before hear no more."""
         for heard in list(logger.filters):
             if type(getattr(heard, "__self__", None)).__name__ == type(self).__name__:
                 logger.removeFilter(heard)
