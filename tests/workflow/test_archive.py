@@ -525,7 +525,8 @@ def test_the_real_study_is_finished_without_its_intermediate_files(touched, tmp_
     ("table", "rule"),
     [
         ("fig5_auc.csv", "score_features"),  # is drawn
-        ("fig5_features.csv", "score_features"),  # is drawn by no figure
+        # is drawn by no figure
+        pytest.param("fig5_features.csv", "score_features", marks=pytest.mark.slow),
         pytest.param("predictors_detections.parquet", "score_predictors", marks=pytest.mark.slow),
         pytest.param("refinement.csv", "count_refined", marks=pytest.mark.slow),
     ],

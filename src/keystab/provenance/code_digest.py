@@ -240,7 +240,8 @@ def _entries_used(tree: ast.Module, module: str, is_package: bool, catalogue: st
     parent, _, last = catalogue.rpartition(".")
     aliases: set[str] = set()
     used: set[str] = set()
-    for node in ast.walk(tree):
+    nodes = list(ast.walk(tree))
+    for node in nodes:
         if isinstance(node, ast.Import) and any(alias.name == catalogue for alias in node.names):
             raise ValueError(f"{module} says 'import {catalogue}': write 'from {parent} import'")
         if isinstance(node, ast.ImportFrom):
@@ -251,12 +252,12 @@ def _entries_used(tree: ast.Module, module: str, is_package: bool, catalogue: st
                 used |= {one.name for one in node.names}
     attributes = [
         node
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.Attribute)
         and isinstance(node.value, ast.Name)
         and node.value.id in aliases
     ]
-    n_names = sum(isinstance(node, ast.Name) and node.id in aliases for node in ast.walk(tree))
+    n_names = sum(isinstance(node, ast.Name) and node.id in aliases for node in nodes)
     if n_names != len(attributes) or "*" in used:
         raise ValueError(
             f"{module} uses {catalogue} as a whole: take its entries by their names, as in "
@@ -302,12 +303,18 @@ def _behind(base: str, name: str, module: str, package_folder: Path) -> list[str
     path = _file_of(base, package_folder)
     if path is not None and path.name != "__init__.py":
         return []
-    if path is None or name not in _top_level_names(ast.parse(path.read_bytes())):
+    if path is None or name not in _names_in(path):
         raise ValueError(
             f"{module} imports {name} from {base}, which does not define it in its source: "
             "import it from the module that does, so that its code can be followed"
         )
     return [base]
+
+
+@cache
+def _names_in(path: Path) -> set[str]:
+    """Names that a file binds: many modules import from the same package."""
+    return _top_level_names(ast.parse(path.read_bytes()))
 
 
 def _with_parents(name: str, package: str) -> list[str]:
