@@ -44,6 +44,8 @@ def report(project: Project) -> tuple[subprocess.CompletedProcess[str], str]:
     return run, page.read_text() if page.exists() else ""
 
 
+# The page itself is tested in tests/unit/test_report_page.py, without a run.
+@pytest.mark.slow
 def test_all_of_a_run_in_one_file(finished):
     (finished.folder / "results/quick/claims.json").write_text(json.dumps([CLAIM]))
     assert finished.snakemake(*QUICK, "--touch", "--forcerun", "checksums").returncode == 0
