@@ -57,7 +57,7 @@ def _draw_row(ax: Axes) -> None:
 def _draw_left(ax: Axes) -> None:
     frequency = np.linspace(0, 1, 200)
     ax.axvspan(0.5, 1, color=palette.PALE, alpha=0.45, lw=0)
-    ax.axvline(0.5, color=palette.GREY, ls="--", lw=0.8)
+    ax.axvline(0.5, color=palette.GREY, ls=style.REFERENCE, lw=0.8)
     colours = palette.sweep_colours(BLURS)
     for blur in BLURS:
         left = np.exp(-((2 * np.pi * frequency * blur) ** 2) / 2)

@@ -69,7 +69,7 @@ def _draw_balance(ax: Axes) -> None:
 def _draw_blob(ax: Axes) -> None:
     sigma = np.geomspace(1.1, 3.3, 200)
     found = float(dog_extremum_scale(BLOB, KAPPA))
-    ax.axvline(found, color=palette.GREY, ls="--", lw=0.8, ymax=0.9)
+    ax.axvline(found, color=palette.GREY, ls=style.REFERENCE, lw=0.8, ymax=0.9)
     ax.plot(sigma, dog_at_centre(sigma, BLOB, KAPPA), color=palette.PALE, lw=2.5, zorder=1)
     for n_spo, mark, size, colour in (
         (15, ".", 3.5, palette.DETECTION_COLOURS["refined"]),

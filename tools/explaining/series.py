@@ -57,7 +57,7 @@ def _draw_mirrors(ax: Axes) -> None:
     ax.plot(where[inside], mirrored[inside], "o", color=palette.INK, ms=4, mec="none")
     ax.plot(where[~inside], mirrored[~inside], "o", mfc="white", mec=palette.INK, ms=4, mew=0.8)
     for mirror in (-0.5, n - 0.5):
-        ax.axvline(mirror, color=palette.GREY, ls="--", lw=0.8, ymax=0.86)
+        ax.axvline(mirror, color=palette.GREY, ls=style.REFERENCE, lw=0.8, ymax=0.86)
     for x, text in (
         (-n / 2 - 0.5, "mirror image"),
         (n / 2 - 0.5, "image"),
