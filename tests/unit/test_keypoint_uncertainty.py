@@ -17,7 +17,8 @@ from keystab.prediction.detector_error import detector_error
 from keystab.prediction.local_jets import local_jets
 from keystab.prediction.noise_covariance import ORDER, ORDERS, band_moments, noise_jets, scene_jets
 from keystab.prediction.noise_level import estimated_noise
-from keystab.prediction.survival import _slopes, after_noise
+from keystab.prediction.quartic_extrema import slopes
+from keystab.prediction.survival import after_noise
 from keystab.prediction.uncertainty import _at_keypoints, _error_bars
 from keystab.scalespace.continuous_dog import DogSeries
 
@@ -203,7 +204,7 @@ def test_slopes_of_a_quartic_are_differences_of_its_values():
     at, h = np.array([0.3, -0.2, 0.4]), 1e-3
     gradient, hessian = np.empty(3), np.empty((3, 3))
     work = np.empty(10), np.empty(10), np.empty(6)
-    _slopes(jet, -2.0, at, *work, gradient, hessian)
+    slopes(jet, -2.0, at, *work, gradient, hessian)
     for i, a in enumerate(h * np.eye(3)):
         assert gradient[i] == pytest.approx(
             -2 * (value(at + a) - value(at - a)) / (2 * h), abs=1e-5

@@ -38,7 +38,6 @@ for 0.068), because its edges have one direction: so none is inferred.
 
 from __future__ import annotations
 
-import math
 from functools import cache
 from typing import NamedTuple
 
@@ -47,11 +46,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from keystab.prediction.noise_covariance import ORDERS, scene_jets
+from keystab.prediction.quartic_extrema import RADIUS, climb, tops
 
 __all__ = ["RADIUS", "Outcome", "after_noise", "among_scenes"]
-
-RADIUS = 0.5
-"""How far a returning extremum is at most, in (ln sigma, y/sigma, x/sigma)."""
 
 #: Draws for each extremum. Their share is uncertain by 0.02 in the middle and less at the ends.
 _DRAWS = 256
@@ -169,8 +166,8 @@ def _at_extremum(jets: NDArray[np.float64]) -> NDArray[np.float64]:
 def _saddles(jets: NDArray[np.float64], sign: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which keypoints are extrema of the samples only, the Hessian being indefinite."""
     hessian = jets[:, [[4, 5, 6], [5, 7, 8], [6, 8, 9]]]
-    least: NDArray[np.float64] = np.linalg.eigvalsh(-sign[:, None, None] * hessian)[:, 0]
-    return least <= 0
+    least: NDArray[np.bool_] = np.linalg.eigvalsh(-sign[:, None, None] * hessian)[:, 0] <= 0
+    return least
 
 
 def _regular(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -216,7 +213,9 @@ def _drawn(
     the components of the same vectors along `axes`: eigenvectors have no sign, and those of equal
     eigenvalues no direction, of their own, so that processors would give each keypoint other draws.
     """
-    spread = np.array(np.broadcast_to(spread, mean.shape))  # of one layout: compiled once
+    # Of one layout: compiled once, and fast.
+    spread = np.array(np.broadcast_to(spread, mean.shape))
+    axes = np.ascontiguousarray(axes)
     count = np.empty(len(sign))
     moments = np.empty((len(sign), 3, 3))
     columns = np.ascontiguousarray(basis.swapaxes(1, 2))
@@ -245,206 +244,31 @@ def _climb_all(  # noqa: PLR0913
     columns, axes, mean, spread, cumulative, offset, sign, grid, saddle, draws, count, moments
 ):
     size = mean.shape[2]
-    place, jet, coordinate = np.empty(3), np.empty(size), np.empty(size)
-    work = np.empty((8, 10))  # of a climb, which would spend half its time on asking for memory
+    normal = np.ascontiguousarray(draws[:, :size])
+    coordinates, jets = np.empty(normal.shape), np.empty(normal.shape)
+    place, work = np.empty(3), np.empty((8, 10))  # asking for memory would take half of a climb
+    samples = np.empty((7, 7, 7))
     moments[:] = 0.0
     for point in range(sign.size):
         count[point] = 0
-        for draw in draws:
+        np.dot(normal, axes[point], coordinates)
+        for draw in range(draws.shape[0]):
             k = 0
-            while k < cumulative.shape[1] - 1 and cumulative[point, k] < draw[size]:
+            while k < cumulative.shape[1] - 1 and cumulative[point, k] < draws[draw, size]:
                 k += 1
-            coordinate[:] = 0.0
-            for m in range(size):
-                for i in range(size):
-                    coordinate[i] += axes[point, m, i] * draw[m]
             for i in range(size):
-                coordinate[i] = mean[point, k, i] + spread[point, k, i] * coordinate[i]
-            jet[:] = offset[point]
-            for m in range(size):
-                for i in range(size):
-                    jet[i] += columns[point, m, i] * coordinate[m]
-            found = _climb(jet, sign[point], grid[point, :2], grid[point, 2:], place, work)
+                coordinates[draw, i] *= spread[point, k, i]
+                coordinates[draw, i] += mean[point, k, i]
+        np.dot(coordinates, columns[point], jets)
+        jets += offset[point]
+        steps, lattice = grid[point, :2], grid[point, 2:]
+        for jet in jets:
+            found = climb(jet, sign[point], steps, lattice, place, work, samples)
             if saddle[point] and not found:
                 place[:] = 0.0
-                found = _tops(jet, -sign[point], place, grid[point, :2], grid[point, 2:])
+                found = tops(jet, -sign[point], place, steps, lattice, samples)
             if found:
                 count[point] += 1
                 for i in range(3):
                     for m in range(3):
                         moments[point, i, m] += place[i] * place[m]
-
-
-@njit(cache=True, nogil=True)
-def _climb(jet, sign, grid, lattice, place, work):
-    """Climb to the extremum of a quartic nearest to the origin, and say whether it is near."""
-    place[:] = 0.0
-    along, third, pair = work[0], work[1], work[2, :6]  # by order: 3, 3 and 2
-    h, g, step = work[3:6, :3], work[6, :3], work[7, :3]
-    radius2 = RADIUS * RADIUS
-    for _ in range(25):
-        _slopes(jet, -sign, place, along, third, pair, g, h)  # of -s w, to be minimised
-        shift = 0.0
-        size = abs(h[0, 0]) + abs(h[1, 1]) + abs(h[2, 2]) + 1e-300
-        settled, saddle = True, False
-        if not _solved(h, shift, g, step):
-            settled = _stands_out(h, grid) and _stationary(h, g, step)
-            saddle = settled
-            while not settled and not _solved(h, shift, g, step):
-                shift = max(2.0 * shift, 0.05 * size)
-        length = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
-        factor = min(1.0, 0.2 / length) if length > 0 else 1.0
-        far = 0.0
-        for i in range(3):
-            place[i] -= factor * step[i]
-            far += place[i] ** 2
-        if far > 2.25 * radius2:
-            return False
-        if settled and length < 1e-3:
-            if saddle and not _tops(jet, -sign, place, grid, lattice):
-                return False
-            return far < radius2
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _stands_out(h, grid):
-    """Whether the curvature is that of an extremum along the 13 directions of the grid."""
-    for code in range(14, 27):  # one of each pair of opposite neighbours
-        a = (code // 9 - 1) * grid[0]
-        b = (code // 3 % 3 - 1) * grid[1]
-        c = (code % 3 - 1) * grid[1]
-        along = h[0, 0] * a * a + h[1, 1] * b * b + h[2, 2] * c * c
-        along += 2.0 * (h[0, 1] * a * b + h[0, 2] * a * c + h[1, 2] * b * c)
-        if not along > 0:
-            return False
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _tops(jet, factor, place, grid, lattice):
-    """Whether a sample within two steps of a place is the least of its neighbours on the grid."""
-    value, at, steps = np.empty((7, 7, 7)), np.empty(3), (grid[0], grid[1], grid[1])
-    first = np.empty(3)
-    for i in range(3):
-        first[i] = (np.rint(place[i] / steps[i] - lattice[i]) + lattice[i] - 3) * steps[i]
-    along, third, pair = np.empty(10), np.empty(10), np.empty(6)
-    for i in range(7):
-        at[0] = first[0] + i * steps[0]
-        for j in range(7):
-            at[1] = first[1] + j * steps[1]
-            for k in range(7):
-                at[2] = first[2] + k * steps[2]
-                value[i, j, k] = factor * _value(jet, at, along, third, pair)
-    for i in range(1, 6):
-        for j in range(1, 6):
-            for k in range(1, 6):
-                if _is_least(value, i, j, k):
-                    return True
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _is_least(value, i, j, k):
-    here = value[i, j, k]
-    for a in range(i - 1, i + 2):
-        for b in range(j - 1, j + 2):
-            for c in range(k - 1, k + 2):
-                if value[a, b, c] <= here and not (a == i and b == j and c == k):
-                    return False
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _value(jet, d, along, third, pair):
-    """Value of a quartic at a displacement, less that at none."""
-    _contracted(jet[20:], 3, d, along)
-    for k in range(10):
-        third[k] = jet[10 + k] / 6.0 + along[k] / 24.0
-    _contracted(third, 2, d, pair)
-    for k in range(6):
-        pair[k] += jet[4 + k] / 2.0
-    _contracted(pair, 1, d, third)
-    return (jet[1] + third[0]) * d[0] + (jet[2] + third[1]) * d[1] + (jet[3] + third[2]) * d[2]
-
-
-@njit(cache=True, nogil=True)
-def _stationary(h, g, step):
-    """Solve H step = g by cofactors; False where H is singular."""
-    c0 = h[1, 1] * h[2, 2] - h[1, 2] * h[1, 2]
-    c1 = h[0, 2] * h[1, 2] - h[0, 1] * h[2, 2]
-    c2 = h[0, 1] * h[1, 2] - h[0, 2] * h[1, 1]
-    determinant = h[0, 0] * c0 + h[0, 1] * c1 + h[0, 2] * c2
-    if determinant == 0:
-        return False
-    c11 = h[0, 0] * h[2, 2] - h[0, 2] * h[0, 2]
-    c12 = h[0, 1] * h[0, 2] - h[0, 0] * h[1, 2]
-    c22 = h[0, 0] * h[1, 1] - h[0, 1] * h[0, 1]
-    step[0] = (c0 * g[0] + c1 * g[1] + c2 * g[2]) / determinant
-    step[1] = (c1 * g[0] + c11 * g[1] + c12 * g[2]) / determinant
-    step[2] = (c2 * g[0] + c12 * g[1] + c22 * g[2]) / determinant
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _solved(h, shift, g, step):
-    """Solve (H + shift) step = g by Cholesky's decomposition; False where H is not definite."""
-    a = h[0, 0] + shift
-    if not a > 0:
-        return False
-    l00 = math.sqrt(a)
-    l10, l20 = h[1, 0] / l00, h[2, 0] / l00
-    b = h[1, 1] + shift - l10 * l10
-    if not b > 0:
-        return False
-    l11 = math.sqrt(b)
-    l21 = (h[2, 1] - l20 * l10) / l11
-    c = h[2, 2] + shift - l20 * l20 - l21 * l21
-    if not c > 0:
-        return False
-    l22 = math.sqrt(c)
-    u = g[0] / l00
-    v = (g[1] - l10 * u) / l11
-    w = (g[2] - l20 * u - l21 * v) / l22
-    step[2] = w / l22
-    step[1] = (v - l21 * step[2]) / l11
-    step[0] = (u - l10 * step[1] - l20 * step[2]) / l00
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _slopes(jet, factor, d, along, third, pair, g, h):  # noqa: PLR0913
-    """Gradient and Hessian of a quartic at a displacement, times a factor."""
-    _contracted(jet[20:], 3, d, along)
-    # H + (T + Q d / 2) d
-    for k in range(10):
-        third[k] = jet[10 + k] + along[k] / 2.0
-    _contracted(third, 2, d, pair)
-    k = 0
-    for i in range(3):
-        for j in range(i, 3):
-            h[i, j] = h[j, i] = factor * (jet[4 + k] + pair[k])
-            k += 1
-    # g + (H + (T / 2 + Q d / 6) d) d
-    for k in range(10):
-        third[k] = jet[10 + k] / 2.0 + along[k] / 6.0
-    _contracted(third, 2, d, pair)
-    for k in range(6):
-        pair[k] += jet[4 + k]
-    _contracted(pair, 1, d, g)
-    for i in range(3):
-        g[i] = factor * (jet[1 + i] + g[i])
-
-
-@njit(cache=True, nogil=True)
-def _contracted(tensor, order, d, out):
-    """Symmetric tensor times a vector: a tensor of the order that is left, ordered as `ORDERS`.
-
-    With j of its indices not the scale, those with one more index of scale, y and x lie 0, j + 1
-    and j + 2 places on.
-    """
-    k = 0
-    for j in range(order + 1):
-        for _ in range(j + 1):
-            out[k] = d[0] * tensor[k] + d[1] * tensor[k + j + 1] + d[2] * tensor[k + j + 2]
-            k += 1
