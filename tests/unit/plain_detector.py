@@ -61,17 +61,18 @@ def dct_scale_space(image, camera_blur, n_spo, delta_min, sigma_min, kappa):
 def margins(dog):
     """By how much each discrete extremum (s, row, column, sign) exceeds its nearest neighbour."""
     found = {}
+    cells = dog.tolist()  # Python's numbers are the same, and quicker to take one by one
     for s in range(1, dog.shape[0] - 1):
         for i in range(1, dog.shape[1] - 1):
             for j in range(1, dog.shape[2] - 1):
-                value = dog[s, i, j]
-                if value - dog[s, i, j - 1] > 0:
+                value = cells[s][i][j]
+                if value - cells[s][i][j - 1] > 0:
                     sign = 1
                 else:
                     sign = -1
                 least = np.inf
                 for a, b, c in STEPS:
-                    difference = sign * (value - dog[s + a, i + b, j + c])
+                    difference = sign * (value - cells[s + a][i + b][j + c])
                     if not difference > 0:
                         break
                     least = min(least, difference)

@@ -283,7 +283,7 @@ def tops_its_neighbours(hessian, steps, off):
 
 def test_a_saddle_counts_where_a_sample_of_the_grid_tops_its_neighbours():
     draw = np.random.default_rng(11)
-    n, steps = 400, (0.05, 0.08, 0.08)
+    n, steps = 120, (0.05, 0.08, 0.08)
     jets, off = np.zeros((n, len(ORDERS))), draw.uniform(-0.6, 0.6, (n, 3))
     axes = np.linalg.qr(draw.standard_normal((n, 3, 3)))[0]
     curvature = -np.abs(draw.uniform(0.5, 2.0, (n, 3)))

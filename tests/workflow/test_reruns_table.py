@@ -85,10 +85,10 @@ ALSO_THERE = {
     *("refinement.max_offset", "comparison.match_sign", "stability.seen_by", "semigroup.blob"),
     *("shipped.contrast", "kappas.fractions", "cubes.count"),
 }
-# Of what is left, a view's, a sweep's, the detector's and one block's: a plan takes a second.
+# Of what is left, a sweep's, the detector's and one block's: a plan takes a second.
 LIKE_THESE = {
     *("sets.still.blur", "floor.variants.closer.epsilon", "grid.delta_min", "samplings.n_spo"),
-    *("blobs.n_spo", "logs"),
+    *("blobs.n_spo", "logs", "views_dtype", "sets.translations.n_spo"),
 }
 assert set(SOME) > ALSO_THERE | LIKE_THESE
 

@@ -162,11 +162,14 @@ def _read(module: str, package_folder: Path) -> _Code:
     tree = ast.parse(path.read_bytes(), filename=str(path))
     is_package = path.name == "__init__.py"
     imports = _imports(tree, module, is_package, package_folder)
+    catalogues = [
+        name for name in _catalogues(package_folder) if name in imports and name != module
+    ]
+    nodes = list(ast.walk(tree)) if catalogues else []
     entries = frozenset(
         (name, entry)
-        for name in _catalogues(package_folder)
-        if name in imports and name != module
-        for entry in _entries_used(tree, module, is_package, name)
+        for name in catalogues
+        for entry in _entries_used(nodes, module, is_package, name)
     )
     return _Code(_digest([tree]), imports, entries)
 
@@ -235,12 +238,13 @@ def _read_catalogue(module: str, package_folder: Path) -> dict[str, _Entry]:
     return {**entries, "": _Entry(_digest(shared), frozenset())}
 
 
-def _entries_used(tree: ast.Module, module: str, is_package: bool, catalogue: str) -> set[str]:
+def _entries_used(
+    nodes: Sequence[ast.AST], module: str, is_package: bool, catalogue: str
+) -> set[str]:
     """Names that a module uses of a catalogue."""
     parent, _, last = catalogue.rpartition(".")
     aliases: set[str] = set()
     used: set[str] = set()
-    nodes = list(ast.walk(tree))
     for node in nodes:
         if isinstance(node, ast.Import) and any(alias.name == catalogue for alias in node.names):
             raise ValueError(f"{module} says 'import {catalogue}': write 'from {parent} import'")
@@ -380,17 +384,18 @@ def _spell(node: ast.AST, tokens: list[str]) -> None:
     Empty fields are left out so that the same source gives the same tokens under Python versions
     whose trees differ only in fields that the source does not use.
     """
+    values = node.__dict__
     tokens.append(type(node).__name__)
     for field in node._fields:
-        value: Any = getattr(node, field, None)
-        if field in ("body", "orelse", "finalbody") and isinstance(value, list):
-            value = [statement for statement in value if not _is_text(statement)]
-        if value is None or value == [] or field == "kind":
+        value: Any = values.get(field)
+        if value is None or field == "kind":
             continue
-        tokens.append(field)
-        if isinstance(value, ast.AST):
-            _spell(value, tokens)
-        elif isinstance(value, list):
+        if isinstance(value, list):
+            if field in ("body", "orelse", "finalbody"):
+                value = [statement for statement in value if not _is_text(statement)]
+            if not value:
+                continue
+            tokens.append(field)
             for item in value:
                 if isinstance(item, ast.AST):
                     _spell(item, tokens)
@@ -398,7 +403,11 @@ def _spell(node: ast.AST, tokens: list[str]) -> None:
                     tokens.append(repr(item))
             tokens.append("]")
         else:
-            tokens.append(repr(value))
+            tokens.append(field)
+            if isinstance(value, ast.AST):
+                _spell(value, tokens)
+            else:
+                tokens.append(repr(value))
 
 
 def _is_text(statement: ast.AST) -> bool:
