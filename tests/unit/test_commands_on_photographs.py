@@ -184,7 +184,7 @@ def test_a_photograph_is_no_point_spread_function():
 
 def test_pictures_are_described(photo):
     lines = describe(photo).splitlines()
-    assert lines[0].endswith("picture of 50 x 64 pixels, 0.0032 megapixels")
+    assert lines[0].endswith("picture, 50 pixels high, 64 wide: 0.0032 megapixels")
     notes = photo.with_name("notes.txt")
     notes.write_text("no picture")
     with pytest.raises(InputError, match="notes.txt: its content is none of"):
