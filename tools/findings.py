@@ -9,7 +9,7 @@ The templates lie in docs/findings/templates. They hold the words; measured numb
 {{ claim("no-feature-separates.best") | interval }}         with its interval: 0.78 (0.74 to 0.83)
 {{ cell("fig4_counts.n_common", n_spo=3) }}                 of the one such row of a table: 499
 {{ column("fig4_counts.n_common") | max }}                  of all such rows
-{{ cost("Everything") | fixed(0) }}                         minutes that docs/reproduce/costs.md says
+{{ cost("Everything") | fixed(0) }}                         minutes, of docs/reproduce/costs.md
 {{ verdict("almost-20-percent-always") }}                   in words: **does not hold**
 {{ ledger("fig4") }}                                        a table of the claims of a figure
 
@@ -174,7 +174,7 @@ def _numbers(one: dict[str, Any]) -> Iterator[str]:
 @cache
 def table(name: str) -> pd.DataFrame:
     """A table of the committed results."""
-    paths = {one.stem: one for kind in ("tables", "audit") for one in REFERENCE.glob(f"{kind}/*.csv")}
+    paths = {path.stem: path for path in REFERENCE.glob("*/*.csv") if path.parent.name != "scenes"}
     return read_table(paths[known(name, sorted(paths), "table")])
 
 

@@ -33,6 +33,22 @@ def test_pages_are_what_their_templates_and_the_results_make(tool):
     assert tool.main(["--check"]) == 0
 
 
+def test_the_page_of_several_pictures_says_of_the_study_s_what_the_results_say(
+    monkeypatch, tmp_path, capsys
+):
+    monkeypatch.syspath_prepend(TOOLS)
+    tool = importlib.import_module("claims_pictures")
+    assert tool.main(["--check"]) == 0  # otherwise: python tools/claims_pictures.py
+    for kind in ("csv", "md"):
+        text = (TOOLS.parent / f"docs/claims_pictures.{kind}").read_text()
+        (tmp_path / f"claims_pictures.{kind}").write_text(text.replace("stable 64.27", "stable 60"))
+    monkeypatch.setattr(tool, "PAGES", tmp_path)
+    assert tool.main(["--check"]) == 1
+    assert tool.main([]) == 0 and tool.main(["--check"]) == 0
+    assert "stable 64.27" in (tmp_path / "claims_pictures.csv").read_text()
+    assert "python tools/claims_pictures.py" in capsys.readouterr().out
+
+
 def test_every_page_has_a_template(tool):
     written = {path.name for path in tool.pages().values()}
     assert {path.name for path in (TOOLS.parent / "docs/findings").glob("*.md")} <= written
