@@ -148,7 +148,7 @@ def test_the_blur_can_be_told_from_edges(tmp_path, capsys):
     write_picture(ndtr((x - 40 + 0.4 * y - 12) / np.hypot(1, 0.4) / 0.9), tmp_path / "edge.npy")
     status, out, err = run(tmp_path / "edge.npy", "detect PHOTO --camera-blur auto", capsys)
     assert status == 0 and out.startswith("y,x,")
-    assert "camera blur 0.90 px (0.7" in err and "figure S2" in err
+    assert "camera blur 0.90 px (0.7" in err and "% larger" in err
     # An extremum of blur c at sigma lies at the same sigma^2 - c^2 whatever blur is assumed.
     assert "scales near 1.1 px would be 9% larger" in err
 
