@@ -163,10 +163,11 @@ def _summary(args: argparse.Namespace, found: pd.DataFrame) -> str:
         ]
     if len(found) and "survival" in found:
         off = found[["std_y", "std_x"]].max(axis=1)
+        scale = math.expm1(found["std_log_sigma"].median())
         lines += [
             f"position         half have a standard deviation below {off.median():.2g} px, nine "
             f"tenths below {off.quantile(0.9):.2g}",
-            f"scale            half have one below {math.expm1(found['std_log_sigma'].median()):.1%}",
+            f"scale            half have one below {scale:.1%}",
             f"survival         {(found['survival'] > 0.9).mean():.0%} above 0.9, "
             f"{(found['survival'] < 0.5).mean():.0%} below 0.5",
             f"noise            {found['noise'].median():.3g}, "
