@@ -71,7 +71,7 @@ docs: environment .venv-docs/.stamp ## The site with all documents: build/docs/i
 	python tools/tutorial.py --check
 	.venv-docs/bin/python -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
 
-test: environment ## All tests
+test: environment ## The tests, in some minutes
 	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 test-slow: environment ## The tests that take minutes: twenty kills of the draft, a cluster
@@ -117,7 +117,7 @@ clean: ## Delete all results, figures and logs
 	rm -rf figures logs
 	find results -mindepth 1 -maxdepth 1 ! -name reference ! -name README.md -exec rm -rf {} + 2>/dev/null || true
 
-environment:
+environment: ## Only .venv, with the command keystab, in a minute or two
 	@tools/environment
 
 .venv-audit/.stamp: audit.lock | environment

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import yaml
 
+from keystab import __version__
 from keystab.provenance.shielded_environment import shielded
 from keystab.study.plan import FIGURES
 
@@ -85,7 +86,7 @@ def table() -> str:
     """The whole table."""
     logs = yaml.safe_load((ROOT / "config/config.yaml").read_text())["logs"]
     lines = [
-        f"Measured on {machine()}.",
+        f"Measured with keystab {__version__}, on {machine()}.",
         "",
         "| | command | jobs | minutes, one job at a time | largest job's memory | disk |",
         "|---|---|---:|---:|---:|---:|",

@@ -1,4 +1,4 @@
-"""Write README.md, docs/uncertainty.md and docs/findings from templates and committed results.
+"""Write README.md, docs/findings and what `ELSEWHERE` names from templates and committed results.
 
 python tools/findings.py           write them
 python tools/findings.py --check   say whether they are up to date
@@ -9,6 +9,7 @@ The templates lie in docs/findings/templates. They hold the words; measured numb
 {{ claim("no-feature-separates.best") | interval }}         with its interval: 0.78 (0.74 to 0.83)
 {{ cell("fig4_counts.n_common", n_spo=3) }}                 of the one such row of a table: 499
 {{ column("fig4_counts.n_common") | max }}                  of all such rows
+{{ cost("Everything") | fixed(0) }}                         minutes, of docs/reproduce/costs.md
 {{ verdict("almost-20-percent-always") }}                   in words: **does not hold**
 {{ ledger("fig4") }}                                        a table of the claims of a figure
 
@@ -38,7 +39,11 @@ from keystab.io.tables import read_table
 ROOT = Path(__file__).parents[1]
 TEMPLATES = ROOT / "docs/findings/templates"
 REFERENCE = ROOT / "results/reference"
-ELSEWHERE = {"README.md": "README.md", "uncertainty.md": "docs/uncertainty.md"}
+COSTS = ROOT / "docs/reproduce/costs.md"
+ELSEWHERE = {
+    "README.md": "README.md",
+    **{name: f"docs/{name}" for name in ("deviations.md", "uncertainty.md")},
+}
 """Templates of pages that do not lie in docs/findings."""
 WIDTH = 110
 """Characters of a line."""
@@ -169,9 +174,8 @@ def _numbers(one: dict[str, Any]) -> Iterator[str]:
 @cache
 def table(name: str) -> pd.DataFrame:
     """A table of the committed results."""
-    path = REFERENCE / "tables" / f"{name}.csv"
-    known(name, sorted(one.stem for one in path.parent.glob("*.csv")), "table")
-    return read_table(path)
+    paths = {path.stem: path for path in REFERENCE.glob("*/*.csv") if path.parent.name != "scenes"}
+    return read_table(paths[known(name, sorted(paths), "table")])
 
 
 def figure(name: str, says: str) -> str:
@@ -180,6 +184,15 @@ def figure(name: str, says: str) -> str:
     known(name, sorted(one.stem for one in (ROOT / "docs/figures").glob("*.png")), "figure")
     title = f"Figure {name.removeprefix('fig')}"
     return f"[![{title}]({path})]({path})\n\n*{title}. {says}*"
+
+
+@cache
+def cost(name: str) -> float:
+    """Minutes of all jobs of a row of docs/reproduce/costs.md, one at a time."""
+    lines = COSTS.read_text(encoding="utf-8").splitlines()
+    rows = [[cell.strip() for cell in line.split("|")] for line in lines if line.startswith("|")]
+    minutes = {row[1]: row[4] for row in rows[2:]}
+    return float(minutes[known(name, minutes, "row of costs")])
 
 
 def column(place: str, **where: Any) -> list[float]:
@@ -279,8 +292,8 @@ def environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     functions: list[Callable[..., Any]] = [
-        claim, verdict, statement, chosen, ledger, figure, cell, column, pooled, apart, scenes,
-        pictures,
+        claim, verdict, statement, chosen, ledger, figure, cell, column, cost, pooled, apart,
+        scenes, pictures,
     ]  # fmt: skip
     made.globals.update({one.__name__: one for one in functions}, inf=math.inf, words=WORDS)
     made.filters.update(percent=percent, fixed=fixed, digits=digits, interval=interval)

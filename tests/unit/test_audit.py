@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from scipy import ndimage
 
+from keystab import __version__
 from keystab.audit.conditions import (
     BLUR,
     CONDITIONS,
@@ -643,7 +644,9 @@ def test_the_command_writes_tables_a_figure_and_a_page(here, capsys):
     fine = table[table["detector"] == "keystab"].set_index("condition")
     assert fine.loc["translations", "recall"] > 0.95 and fine["problem"].isna().all()
     assert fine.loc["translations", "own_recall"] > 0.95
-    assert "keystab audit mine:detect wrong:nan --quick" in Path("out/audit.md").read_text()
+    made = Path("out/audit.md").read_text()
+    assert "keystab audit mine:detect wrong:nan --quick" in made
+    assert f"-o out`, keystab {__version__}." in made
 
 
 def test_the_page_of_documents_is_written_between_its_marks(controls, monkeypatch):

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 
+from keystab import __version__
 from keystab.errors import InputError
 from keystab.io.tables import read_table
 from keystab.stages import compare_claims
@@ -27,8 +28,9 @@ def ledger(folder, rate: float, entries=CLAIMS):
     """Write the ledger of a picture in which a rate was found; its path."""
     table = pd.DataFrame({"rate": [rate], "low": [rate - 0.05], "high": [rate + 0.05], "n": [7]})
     judged = verdicts.outcomes_of(claims.parse_claims(entries), {"rates": table})
+    head = claims_report.heading(f"{folder.name}.png", ["config/config.yaml"], draft=rate > 0.2)
     claims_report.write_report(
-        judged, *(folder / f"claims.{kind}" for kind in ("csv", "json", "md"))
+        judged, *(folder / f"claims.{kind}" for kind in ("csv", "json", "md")), head=head
     )
     return folder / "claims.csv"
 
@@ -81,6 +83,15 @@ def test_people_read_first_what_depends_on_the_picture(three, tmp_path):
     assert "`rare`" in differing and "`rare`" not in same
     assert "Some \\| any. (some)" in same and "`found`" not in differing
     assert same.endswith("`cited`.\n")
+
+
+def test_a_page_of_several_pictures_names_the_run_of_each(three, tmp_path):
+    (tmp_path / "lake/claims.md").unlink()
+    assert compare(three, tmp_path) == 0
+    text = (tmp_path / "out/pictures.md").read_text()
+    run = f"Picture: `{{}}.png`. Settings: `config/config.yaml`. Version: keystab {__version__}."
+    assert f"| hill | {run.format('hill')} |\n| lake | not recorded |\n" in text
+    assert f"| town | *Draft.* {run.format('town')} |" in text
 
 
 def test_claims_are_brought_together_by_their_names(three, tmp_path):

@@ -148,7 +148,7 @@ def test_the_blur_can_be_told_from_edges(tmp_path, capsys):
     write_picture(ndtr((x - 40 + 0.4 * y - 12) / np.hypot(1, 0.4) / 0.9), tmp_path / "edge.npy")
     status, out, err = run(tmp_path / "edge.npy", "detect PHOTO --camera-blur auto", capsys)
     assert status == 0 and out.startswith("y,x,")
-    assert "camera blur 0.90 px (0.7" in err and "figure S2" in err
+    assert "camera blur 0.90 px (0.7" in err and "% larger" in err
     # An extremum of blur c at sigma lies at the same sigma^2 - c^2 whatever blur is assumed.
     assert "scales near 1.1 px would be 9% larger" in err
 
@@ -184,7 +184,7 @@ def test_a_photograph_is_no_point_spread_function():
 
 def test_pictures_are_described(photo):
     lines = describe(photo).splitlines()
-    assert lines[0].endswith("picture of 50 x 64 pixels, 0.0032 megapixels")
+    assert lines[0].endswith("picture, 50 pixels high, 64 wide: 0.0032 megapixels")
     notes = photo.with_name("notes.txt")
     notes.write_text("no picture")
     with pytest.raises(InputError, match="notes.txt: its content is none of"):

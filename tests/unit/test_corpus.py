@@ -223,7 +223,12 @@ def test_one_scene_has_no_interval():
 
 def test_the_report_and_the_figure_have_every_claim_that_was_tested():
     found = over(a_first=ALL_OF, b_second={**ALL_OF, "text": 0}).reset_index()
-    text = to_markdown(found, {"a_first": "All | is well.", "b_second": "Some is."})
+    text = to_markdown(
+        found,
+        {"a_first": "All | is well.", "b_second": "Some is."},
+        {"lake": "Picture: `lake.png`."},
+    )
+    assert text.endswith("| lake | Picture: `lake.png`. |\n")
     assert "| `a_first` | All \\| is well. | 33 of 33 (0.90 to 1.00) |" in text
     assert "| `b_second` | Some is. | 27 of 33 (0.66 to 0.91) | 9 of 9 |" in text
     tables = {"claims_over_scenes": found, "claims_by_family": scene_verdicts.by_family(found)}

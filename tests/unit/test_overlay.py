@@ -65,7 +65,7 @@ def test_correlated_errors_tilt_an_ellipse_the_right_way(tmp_path):
 def test_a_part_shows_its_keypoints_and_no_others(tmp_path):
     both = pd.concat([table(), table(y=[50.0], x=[10.0])])
     words = draw_keypoints(PICTURE, both, tmp_path / "k.png", part=(0, 40, 40, 60))
-    assert words.startswith("1 keypoints")
+    assert words.startswith("1 of 2 keypoints")
 
 
 def test_the_same_keypoints_give_the_same_bytes_and_nothing_of_the_day(tmp_path):

@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from keystab._version import __version__
 from keystab.audit.conditions import BLOBS, HIGH, LOW
 from keystab.audit.run import CONTROL
 
@@ -43,11 +44,11 @@ def page(table: pd.DataFrame, command: str, scene: str, figure: str = "audit.png
     """
     parts = [
         "# An audit of detectors",
-        f"Made by `{command}`. Views show {scene}; numbers are of scales from {LOW:g} to {HIGH:g} "
-        "pixels. *Blobs* are isolated Gaussians at known places, spread over all sub-pixel "
-        f"phases; *{PHOTOGRAPH}* are views of the scene, {_camera()}. In brackets stand 95 % "
-        "intervals. `audit.csv` has all numbers, `audit_octaves.csv` the same by octave, "
-        "`audit_phases.csv` how errors follow the sub-pixel phase. A convention such as "
+        f"Made by `{command}`, keystab {__version__}. Views show {scene}; numbers are of scales "
+        f"from {LOW:g} to {HIGH:g} pixels. *Blobs* are isolated Gaussians at known places, spread "
+        f"over all sub-pixel phases; *{PHOTOGRAPH}* are views of the scene, {_camera()}. In "
+        "brackets stand 95 % intervals. `audit.csv` has all numbers, `audit_octaves.csv` the same "
+        "by octave, `audit_phases.csv` how errors follow the sub-pixel phase. A convention such as "
         "`0 yx sigma` says where the centre of the first pixel is, which coordinate comes first "
         "and what a scale is; *at matched number* means of the strongest keypoints, as many for "
         "every detector. docs/audit.md of keystab says how to read the rest.",

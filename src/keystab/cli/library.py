@@ -163,10 +163,11 @@ def _summary(args: argparse.Namespace, found: pd.DataFrame) -> str:
         ]
     if len(found) and "survival" in found:
         off = found[["std_y", "std_x"]].max(axis=1)
+        scale = math.expm1(found["std_log_sigma"].median())
         lines += [
             f"position         half have a standard deviation below {off.median():.2g} px, nine "
             f"tenths below {off.quantile(0.9):.2g}",
-            f"scale            half below {math.expm1(found['std_log_sigma'].median()):.1%}",
+            f"scale            half have one below {scale:.1%}",
             f"survival         {(found['survival'] > 0.9).mean():.0%} above 0.9, "
             f"{(found['survival'] < 0.5).mean():.0%} below 0.5",
             f"noise            {found['noise'].median():.3g}, "
@@ -190,7 +191,7 @@ def _blur_of_edges(args: argparse.Namespace, image: np.ndarray) -> float:
     print(
         f"{args.picture}: camera blur {found.blur:.2f} px ({found.low:.2f} to {found.high:.2f}), "
         f"from {found.n_edges} pixels on edges; if it were {found.high:.2f}, scales near "
-        f"{args.sigma_min:g} px would be {off:.0%} larger (figure S2 shows what a wrong blur does)",
+        f"{args.sigma_min:g} px would be {off:.0%} larger",
         file=sys.stderr,
     )
     if found.blur > args.sigma_min:

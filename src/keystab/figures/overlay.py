@@ -92,7 +92,8 @@ def draw_keypoints(
         figure, axes, zoom = _canvas(crop, (top, left))
         values = shown[colour].to_numpy(dtype=np.float64)
         _circles(axes, shown, _rgb(colour, values), zoom)
-        words = f"{len(shown)} keypoints; circles: radius σ"
+        beyond = f" of {len(keypoints)}" if len(shown) < len(keypoints) else ""
+        words = f"{len(shown)}{beyond} keypoints; circles: radius σ"
         factor = _ellipses(axes, shown, _rgb(colour, values), enlarge)
         if factor:
             words += f"; ellipses: 95 % of the position, enlarged {factor:g} times"

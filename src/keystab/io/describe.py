@@ -99,7 +99,8 @@ def _picture(path: Path) -> str:
     height, width = picture.shape
     return "\n".join(
         [
-            f"{path}: picture of {height} x {width} pixels, {height * width / 1e6:.3g} megapixels",
+            f"{path}: picture, {height} pixels high, {width} wide: "
+            f"{height * width / 1e6:.3g} megapixels",
             f"  grey values {picture.min():.6g} to {picture.max():.6g}, mean {picture.mean():.6g}",
             f"  {_counted(int((picture >= 1).sum()), 'pixel')} at 1 or above, "
             f"{int((picture <= 0).sum())} at 0 or below",

@@ -115,20 +115,15 @@ def keypoint_uncertainty(
     ``docs/uncertainty.md`` says what they were held against, on four photographs that did not steer
     the model, and where they fail.
 
-    What follows was measured with derivatives up to the third order; the fourth changes what
-    ellipses and intervals hold by at most 0.007. With the noise given, they hold the same within
-    0.002. Against the scene's own extremum ellipses are too short where noise is large: 90 %
-    ellipses hold 0.904, 0.864, 0.814, because two shots that agree may err alike.
+    Against the scene's own extremum ellipses are too short where noise is large, because two shots
+    that agree may err alike.
 
     A keypoint of the second shot may serve several of the first: a detector reports some nearly
     degenerate extrema twice or three times. Matched one to one, fewer return than is said where
-    these are many: on ``casamila`` at 0.003 the survival is then off by 0.067, pooled by 0.032,
-    0.020, 0.016.
+    these are many.
 
-    JPEG hides noise from the estimate, more so the less there is: on shots of ``casamila`` and
-    ``otter`` of quality 90 (6 pairs each), 90 % ellipses hold 0.18, 0.09, 0.92 at noise of 0.003,
-    0.01, 0.03 when it is estimated, and 0.64, 0.86, 0.88 when it is given: compression itself moves
-    keypoints as much as a noise of some 0.004 does. Give `noise` for compressed pictures.
+    JPEG hides noise from the estimate, more so the less there is, and moves keypoints itself. Give
+    `noise` for compressed pictures.
 
     The shift of an extremum whose survival is low is not normal: it is limited by the distance at
     which it would not count as the same. Near the ends of the range of scales that is searched, a

@@ -21,7 +21,7 @@ def main(
     """Read the verdicts of every scene; write one row per claim and scene, and what they say."""
     from keystab.io.tables import write_table
     from keystab.study import scene_verdicts
-    from keystab.study.claims_by_scene import read_report
+    from keystab.study.claims_by_scene import read_report, run_of
     from keystab.study.scene_numbers import over_families
     from keystab.study.scene_report import to_markdown
     from keystab.utils.files import written_whole
@@ -35,9 +35,10 @@ def main(
     write_table(means, numbers)
     first = next(iter(reports.values()))
     statements = dict(zip(first["id"], first["statement"], strict=True))
+    runs = {name: run_of(path) for name, path in zip(names, verdicts, strict=True)}
     texts = {
         json: claims.to_json(orient="records", indent=1),
-        markdown: to_markdown(claims, statements),
+        markdown: to_markdown(claims, statements, runs),
     }
     for path, text in texts.items():
         with written_whole(path) as part:

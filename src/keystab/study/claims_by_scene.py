@@ -20,7 +20,17 @@ from keystab.study.verdicts import UNDECIDED, UNTESTED, VERDICTS
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Source", "finished", "missing", "read_report", "side_by_side", "sources", "to_markdown"]
+__all__ = [
+    "Source",
+    "finished",
+    "missing",
+    "read_report",
+    "run_of",
+    "runs_table",
+    "side_by_side",
+    "sources",
+    "to_markdown",
+]
 
 #: What the table says of each picture, after the picture's name and an underscore.
 OF_PICTURE = ("verdict", "value", "interval")
@@ -126,6 +136,37 @@ def read_report(path: Path | str) -> pd.DataFrame:
     return read_table(path, FIELDS).astype(object).fillna("").astype(str)
 
 
+def run_of(report: Path | str) -> str:
+    """Picture, settings and version of the run that made a report, as its `claims.md` says them.
+
+    Parameters
+    ----------
+    report : path
+        Table of verdicts. What `keystab.study.claims_report.heading` wrote stands beside it.
+
+    Returns
+    -------
+    str
+        That line; "not recorded" where there is none.
+    """
+    beside = Path(report).with_suffix(".md")
+    lines = beside.read_text(encoding="utf-8").splitlines() if beside.is_file() else []
+    said = (line for line in lines if line.removeprefix("*Draft.* ").startswith("Picture: "))
+    return next(said, "not recorded")
+
+
+def runs_table(what: str, runs: Mapping[str, str]) -> list[str]:
+    """Lines of a table that says which run (`run_of`) each picture or scene has.
+
+    Examples
+    --------
+    >>> runs_table("scene", {"lake": "Picture: `lake.png`."})
+    ['| scene | run |', '|---|---|', '| lake | Picture: `lake.png`. |']
+    """
+    lines = [f"| {name} | {cell(run)} |" for name, run in runs.items()]
+    return [f"| {what} | run |", "|---|---|", *lines]
+
+
 def side_by_side(reports: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """One row per claim, with its verdict and numbers for every picture.
 
@@ -196,8 +237,15 @@ def pictures_of(table: pd.DataFrame) -> list[str]:
     return [name.removesuffix(ending) for name in map(str, table) if name.endswith(ending)]
 
 
-def to_markdown(table: pd.DataFrame) -> str:
-    """Write a table of `side_by_side` for people: first the verdicts that depend on the picture."""
+def to_markdown(table: pd.DataFrame, runs: Mapping[str, str]) -> str:
+    """Write a table of `side_by_side` for people: first the verdicts that depend on the picture.
+
+    Parameters
+    ----------
+    table : DataFrame
+    runs : mapping
+        Run of each picture, see `run_of`.
+    """
     pictures = pictures_of(table)
     heads = " | ".join(pictures)
     rules = "---|" * len(pictures)
@@ -210,6 +258,8 @@ def to_markdown(table: pd.DataFrame) -> str:
         "each picture explains the verdicts, and `claims_pictures.csv` holds the same as below.",
         "A verdict depends on the picture where two pictures decide it differently; one that is",
         "undecided for a picture contradicts none.",
+        "",
+        *runs_table("picture", runs),
         "",
         f"{depends.sum()} of {len(tested)} verdicts depend on the picture.",
         "",

@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from keystab.study.claims_by_scene import runs_table
 from keystab.study.claims_report import cell
 from keystab.study.scene_verdicts import (
     DEPENDS,
@@ -30,7 +31,9 @@ _SAID = {
 }
 
 
-def to_markdown(claims: pd.DataFrame, statements: Mapping[str, str]) -> str:
+def to_markdown(
+    claims: pd.DataFrame, statements: Mapping[str, str], runs: Mapping[str, str]
+) -> str:
     """Write what `keystab.study.scene_verdicts.over_scenes` found.
 
     Parameters
@@ -38,11 +41,13 @@ def to_markdown(claims: pd.DataFrame, statements: Mapping[str, str]) -> str:
     claims : DataFrame
     statements : mapping
         What each claim says.
+    runs : mapping
+        Run of each scene, see `keystab.study.claims_by_scene.run_of`.
 
     Returns
     -------
     str
-        One table for every kind of verdict, in the order of `KINDS`.
+        One table for every kind of verdict, in the order of `KINDS`, and one of the runs.
     """
     names = [str(name) for name in claims if str(name).endswith("_holds")]
     families = [name.removesuffix("_holds") for name in names if name != "n_holds"]
@@ -52,7 +57,7 @@ def to_markdown(claims: pd.DataFrame, statements: Mapping[str, str]) -> str:
         "",
         f"Verdicts on {int(claims['n_scenes'].max())} scenes: {sizes}.",
         "A claim holds on a scene where its verdict there is *reproduced*; intervals are Wilson's,",
-        "at 95 %, over scenes.",
+        "at 95 %, over scenes. The [runs](#runs) stand at the end.",
         "",
         "| | claims |",
         "|---|---|",
@@ -66,6 +71,7 @@ def to_markdown(claims: pd.DataFrame, statements: Mapping[str, str]) -> str:
         lines.append(f"| claim | it says | holds | {' | '.join(families)} |")
         lines.append(f"|---|---|---|{'---|' * len(families)}")
         lines += [_row(row, statements, families) for row in rows.to_dict("records")]
+    lines += ["", "## Runs", "", *runs_table("scene", runs)]
     return "\n".join(lines) + "\n"
 
 
