@@ -18,6 +18,7 @@ the changed one. What it costs to import and compile is in the seconds.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import csv
 import os
 import random
@@ -43,8 +44,9 @@ ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "tests/mutants"
 WORK = ROOT / "build/mutants"
 TREE, LOOPS = WORK / "tree", WORK / "loops"
+SOUND = WORK / "sound.txt"  # tests that pass on unchanged code, of those that noticed something
 SEED, SIZE, LEAST = 20260722, 300, 10
-ALLOWANCE = 120.0
+ALLOWANCE = 40.0
 """Seconds of tests near a module, beyond its own, that are tried before all others."""
 TESTS = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist"]
 NOT_CHANGED = {"figures/palette.py", "figures/style.py", "_version.py"}
@@ -110,10 +112,10 @@ def find(row: dict[str, Any], source: str) -> Change | None:
     return min(there, key=lambda one: abs(one.line - int(row["line"])), default=None)
 
 
-def tests_of(name: str) -> list[set[str]]:
+def tests_of(name: str, root: Path = ROOT) -> list[set[str]]:
     """Files with tests that name a module; then those that name one which imports it, and so on."""
-    texts = {path: path.read_text() for path in sorted((ROOT / "tests/unit").glob("test_*.py"))}
-    package = ROOT / "src/keystab"
+    texts = {path: path.read_text() for path in sorted((root / "tests/unit").glob("test_*.py"))}
+    package = root / "src/keystab"
     modules = {
         _dotted(path.relative_to(package).as_posix()): path.read_text()
         for path in sorted(package.rglob("*.py"))
@@ -170,6 +172,8 @@ def copy_tree() -> None:
             edited.add(name)
     if not (TREE / ".venv").exists():
         (TREE / ".venv").symlink_to(ROOT / ".venv")
+    if edited:
+        SOUND.unlink(missing_ok=True)
     for name in edited:
         if name.startswith("src/keystab/") and name.endswith(".py"):
             forget(name.removeprefix("src/keystab/"), LOOPS)
@@ -199,13 +203,17 @@ def pytest(words: Sequence[str], loops: Path, limit: float) -> tuple[str, float]
     try:
         said, _ = process.communicate(timeout=limit)
     except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
         return "does not end", time.monotonic() - begin
+    finally:  # of a run that was stopped too: nothing goes on behind it
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
     seconds = time.monotonic() - begin
     if process.returncode in (0, 5):
         return "", seconds
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", said, re.MULTILINE)
+    if "ERROR: file or directory not found" in said or "ERROR: not found" in said:
+        raise SystemExit(said)
+    failed = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", said, re.MULTILINE)
     return failed[1] if failed else said.strip().splitlines()[-1], seconds
 
 
@@ -245,9 +253,20 @@ def noticed(
     when = 10**9 + int(row["number"])  # compiled files go by the second: each change has its own
     os.utime(path, (when, when))
     try:
-        return _until_noticed(row, costly, failing, loops, all_)
+        found = _until_noticed(row, costly, failing, loops, all_)
     finally:
         shutil.copy2(original, path)
+    _require_sound(found["by"])
+    return found
+
+
+def _require_sound(test: str) -> None:
+    """Stop where a test that noticed something fails on unchanged code too."""
+    sound = SOUND.read_text().splitlines() if SOUND.is_file() else []
+    if "::" in test and test not in sound:
+        if pytest([test], LOOPS, 600.0)[0]:
+            raise SystemExit(f"error: {test} fails on unchanged code; mend it and go on")
+        SOUND.write_text("\n".join([*sound, test]))
 
 
 def _until_noticed(
@@ -255,7 +274,7 @@ def _until_noticed(
 ) -> dict[str, Any]:
     module = _dotted(row["module"])
     own, *others = (
-        sorted(it, key=lambda at: costly.get(at, 1.0)) for it in tests_of(row["module"])
+        sorted(it, key=lambda at: costly.get(at, 1.0)) for it in tests_of(row["module"], TREE)
     )
     near = [file for layer in others for file in layer]
     without = [word for it in failing for word in ("--deselect", it)]
@@ -303,6 +322,7 @@ def write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 def run(numbers: Sequence[int], all_: bool) -> None:
     """Make the changes that have no result yet, or those named; keep each result as it comes."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # the copy is put in order first
     copy_tree()
     costly, failing = costs()
     sample = read(KEPT / "sample.csv")
