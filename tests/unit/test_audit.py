@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,7 @@ from keystab.audit.conditions import (
     HIGH,
     KAPPA,
     LOW,
+    MARGIN,
     PLAN,
     QUICK,
     SPAN,
@@ -46,6 +48,7 @@ from keystab.audit.run import (
 )
 from keystab.audit.worker import columns_of
 from keystab.camera.simulation import Scene
+from keystab.camera.views import ViewSpec
 from keystab.cli.main import main
 from keystab.errors import InputError
 from keystab.io.keypoint_conventions import KEYSTAB, Convention
@@ -712,3 +715,47 @@ def test_the_figure_says_what_lies_beyond_and_what_failed(controls):
     dots = axes["e"].lines[0].get_xdata()
     assert dots[0] == 100 * turned.loc[names[0], "repeatability_1"]
     assert dots[3] == 100 * turned.loc[names[3], "repeatability_1"]
+
+
+# Limits, and height for width
+
+
+def test_a_large_picture_is_seen_from_so_far_that_its_width_is_that_of_the_views():
+    plan = AuditPlan(60, 2, 4)
+    span = scene_of(np.zeros((500, 550)), plan).shape[1]  # of any large one
+    for width in (700, 900):
+        assert scene_of(np.zeros((900, width)), plan).shape[1] == pytest.approx(span, abs=1)
+    high = scene_of(np.zeros((1100, 550)), plan).shape
+    assert high[1] == span and high[0] == pytest.approx(2 * high[1], abs=2)
+
+
+def test_how_large_a_picture_must_be_is_said_in_its_own_pixels():
+    plan = AuditPlan(60, 2, 4)
+    with pytest.raises(InputError) as small:
+        scene_of(np.zeros((300, 390)), plan)
+    with pytest.raises(InputError) as large:  # seen from twice as far
+        scene_of(np.zeros((300, 2 * 407)), plan)
+    (few,), (many,) = (
+        {int(it) for it in re.findall(r"at least (\d+) x", str(each.value))}
+        for each in (small, large)
+    )
+    assert many == pytest.approx(2 * few, rel=0.01)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_what_is_compared_begins_on_the_margin(stage, axis):
+    spec = views_of_size(stage)
+    middle = [(size - 1) / 2 for size in spec.shape]
+    for at, inside in (
+        (MARGIN, True), (MARGIN - 1e-6, False),
+        (spec.shape[axis] - 1 - MARGIN, True), (spec.shape[axis] - 1 - MARGIN + 1e-6, False),
+    ):  # fmt: skip
+        position = list(middle)
+        position[axis] = at
+        y, x = (np.array([it]) for it in position)
+        assert stage.compared(spec, y, x).tolist() == [inside]
+
+
+def views_of_size(stage):
+    """A view in the middle of the scene, oblong, with room around it for the scene's margin."""
+    return ViewSpec(BLUR, STEP, (int(2 * MARGIN) + 7, int(2 * MARGIN) + 12))

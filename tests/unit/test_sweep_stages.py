@@ -10,8 +10,15 @@ import scenes
 
 from keystab.io.pictures import write_picture
 from keystab.io.tables import read_table
-from keystab.io.view_store import read_view
-from keystab.stages import crop_views, detect_views, match_sweep, noise_theory, simulate
+from keystab.io.view_store import read_view, read_views
+from keystab.stages import (
+    crop_views,
+    describe_views,
+    detect_views,
+    match_sweep,
+    noise_theory,
+    simulate,
+)
 
 KAPPA = "1.2599210498948732"
 NOISES = (0.0, 0.02)
@@ -152,3 +159,21 @@ def test_theory_covers_all_octaves(tmp_path):
     octave = theory.set_index(theory["sigma"].round(9))["dog_noise"]
     ratio = octave[1.1] / octave[2.2]
     assert theory["octave_ratio"].iloc[0] == pytest.approx(ratio)
+
+
+def test_views_are_described_by_their_own_pixels(sets, tmp_path):
+    # Oblong views: height and width, and the axes of the pixels, cannot stand for each other.
+    folder = sets[1]
+    out = (tmp_path / "views.csv", tmp_path / "pixels.parquet")
+    stored = ["--views", str(folder / "views"), "--views-digest", str(folder / "views.sha256")]
+    assert describe_views.main([*stored, "--table", str(out[0]), "--pixels", str(out[1])]) == 0
+    table, pixels = map(read_table, out)
+    assert table["view"].tolist() == list(range(N_VIEWS))
+    assert table["label"].tolist() == ["c = 0.8, S = 2"] * N_VIEWS
+    for row in table.itertuples():
+        image = read_views(folder / "views", folder / "views.sha256")[row.view].image
+        own = pixels[pixels["view"] == row.view]
+        assert (row.height, row.width) == image.shape and row.height < row.width
+        assert (row.blur, row.step, len(own)) == (0.8, 2.0, image.size)
+        assert (own["value"].to_numpy() == image[own["y"], own["x"]]).all()
+        assert (row.mean, row.standard_deviation) == pytest.approx((image.mean(), image.std()))
