@@ -68,6 +68,18 @@ def test_tiling_does_not_show(tmp_path, tile):
     )
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("tile", "side"), [(32, 32), (60, 60), (128, 70)])
+def test_tiles_are_no_larger_than_the_longer_side(tmp_path, tile, side, turned):
+    class Oblong(Space):
+        shape = (3, 50, 70) if turned else Space.shape
+        y, x = (Space.x, Space.y) if turned else (Space.y, Space.x)
+
+    scale_space_store.write_scale_space(Oblong(), tmp_path, tile=tile)
+    chunks = scale_space_store.open_scale_space(tmp_path)["dog"].encoding["chunks"]
+    assert tuple(chunks) == (3, side, side)
+
+
 def test_windows_are_read_lazily_and_exactly(store):
     space = scale_space_store.StoredScaleSpace(store)
     box = (slice(1, 3), slice(30, 66), slice(40, 50))
