@@ -452,3 +452,52 @@ def test_the_summary_counts_what_the_table_holds(tmp_path):
     )
     assert "survival" not in bare and "1, 3" in bare
     assert library._summary(Namespace(noise=None, output="t.csv", draw=None), found[:0]) == ""
+
+
+@pytest.mark.parametrize(
+    ("flag", "text", "value"),
+    [
+        ("--camera-blur", "auto", "auto"),
+        ("--camera-blur", "0.75", 0.75),
+        ("--camera-blur", "blurred", None),
+        ("--n-oct", "all", "all"),
+        ("--n-oct", "3", 3),
+        ("--n-oct", "3.5", None),
+        ("--max-iterations", "4", 4.0),
+        ("--max-iterations", "inf", math.inf),
+        ("--max-iterations", "2.5", None),
+        ("--noise", "0.01", 0.01),
+        ("--noise", "0.01 0.02", (0.01, 0.02)),
+        ("--noise", "0.01 0.02 0.03", None),
+    ],
+)
+def test_words_of_the_command_line_become_values(flag, text, value, capsys):
+    words = ["uncertainty", "p.png", "--camera-blur", "1", flag, *text.split()]
+    if value is None:
+        with pytest.raises(SystemExit):
+            build_parser().parse_args(words)
+        assert f"argument {flag}" in capsys.readouterr().err
+    else:
+        given = getattr(build_parser().parse_args(words), flag[2:].replace("-", "_"))
+        assert given == value and type(given) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "good"),
+    [("5", True), ("1e-3", True), ("0", False), ("-1", False), ("inf", False), ("x", False)],
+)
+def test_seconds_of_an_audit_are_above_zero(text, good, capsys):
+    words = ["audit", "mine:detect", "-o", "out", "--time-limit", text]
+    if good:
+        assert build_parser().parse_args(words).time_limit == float(text)
+    else:
+        with pytest.raises(SystemExit):
+            build_parser().parse_args(words)
+        assert "is no time" in capsys.readouterr().err
+
+
+def test_each_command_samples_as_its_question_needs():
+    plain = ["p.png", "--camera-blur", "1"]
+    for command, n_spo, n_oct in (("detect", 3, 1), ("uncertainty", 15, "all")):
+        given = build_parser().parse_args([command, *plain])
+        assert (given.n_spo, given.n_oct) == (n_spo, n_oct)
