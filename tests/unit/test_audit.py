@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 from scipy import ndimage
 
+from keystab.audit import measures
 from keystab.audit.conditions import (
     BLUR,
     CONDITIONS,
@@ -759,3 +760,16 @@ def test_what_is_compared_begins_on_the_margin(stage, axis):
 def views_of_size(stage):
     """A view in the middle of the scene, oblong, with room around it for the scene's margin."""
     return ViewSpec(BLUR, STEP, (int(2 * MARGIN) + 7, int(2 * MARGIN) + 12))
+
+
+def test_a_scale_on_the_end_of_two_octaves_is_of_the_upper_one(monkeypatch):
+    sigma = np.array([1.4, 2.0, 2.8, 2.8, 4.0, 5.6])
+    pairs = SimpleNamespace(sigma=sigma, error=np.zeros((6, 2)), scale=np.zeros(6))
+    monkeypatch.setattr(measures, "_recalled", lambda seen: (sigma, np.ones(6, bool), None))
+    rows = [measures._octave(low, 2 * low, [], pairs) for low in (1.4, 2.8)]
+    assert [row["n"] for row in rows] == [2, 3]
+    assert [row["recall"] for row in rows] == [1.0, 1.0]
+    # Of those of the upper one alone some are lost: the lower one does not know of it.
+    monkeypatch.setattr(measures, "_recalled", lambda seen: (sigma, sigma < 2.8, None))
+    rows = [measures._octave(low, 2 * low, [], pairs) for low in (1.4, 2.8)]
+    assert [row["recall"] for row in rows] == [1.0, 0.0]
