@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from figure_labels import collisions
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgba
 
@@ -124,11 +124,13 @@ def test_the_usual_reading_gives_the_rates_of_the_other_tables(epsilon):
 
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 2**32 - 1))
+@example(8144)  # leaves no extremum in the range
 def test_stricter_readings_never_find_more(seed):
     table = random_extrema(seed, 30)
     readings = crossed([0.0, 1e-6], [1.0, 0.2], ["minimum"])
     rows = reading_table(table, ranges(table, inside), SAMPLINGS, 5, readings, SAME)
     rate = rows.set_index(list(Reading._fields))[["new_rate", "lost_rate"]]
+    rate = rate.fillna(0.0)  # where a draw leaves nothing to count, there is no rate
 
     def of(**choice):
         return rate.loc[tuple(Reading(**choice))]
