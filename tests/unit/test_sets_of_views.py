@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -40,6 +41,8 @@ from keystab.experiments.view_stability import (
 )
 from keystab.matching.common_range import CommonRange
 from keystab.matching.correspondence import matched
+from keystab.parameters import ComparedInViews
+from keystab.stages._compared import common_range
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
 PLAIN = {
@@ -357,3 +360,15 @@ def test_the_common_field_begins_on_the_margin_of_each_view_and_ends_on_the_refe
 )
 def test_a_blur_is_assumed_where_it_is_given_or_spreads(assumed, spread, expected):
     assert assumed_blur({"blur": 0.7, "blur_spread": spread, "assumed_blur": assumed}) == expected
+
+
+@pytest.mark.parametrize(
+    ("guard", "border", "margin"), [(2, 3.0, 3.0), (5, 3.0, 5.0), (3, 3.0, 3.0)]
+)
+def test_the_larger_of_guard_band_and_border_is_left_out(guard, border, margin):
+    views = SimpleNamespace(specs=[ViewSpec(1.1, 2.0, (20, 30))] * 2, reference_shape=(200, 200))
+    asked = ComparedInViews(border, 1.26, 1.9, sigma_min=1.1, n_oct=1, guard=guard)
+    found = common_range(views, asked)
+    at = pd.DataFrame({"view": 0, "y": [margin, margin - 0.01], "x": 15.0, "sigma": 1.6})
+    assert found.margin == margin and len(found.common(at)) == 1
+    assert (found.low, found.high) == pytest.approx((1.1 * 1.26, 1.1 * 1.9))
