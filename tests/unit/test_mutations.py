@@ -100,3 +100,13 @@ def test_the_sample_is_of_all_rooms_with_each_place_once():
         folders, True
     )
     assert len({(row["module"], row["line"]) for row in sample}) == mutants.SIZE
+
+
+def test_what_changes_nothing_is_of_the_sample_with_a_reason_and_was_not_noticed():
+    mutants = importlib.import_module("mutants")
+    results = {row["number"]: row["by"] for row in mutants.read(mutants.KEPT / "results.csv")}
+    numbers = [row["number"] for row in mutants.read(mutants.KEPT / "equivalent.csv")]
+    assert len(set(numbers)) == len(numbers)
+    assert all(not results.get(number) for number in numbers)
+    assert {int(number) for number in numbers} <= set(range(1, mutants.SIZE + 1))
+    assert all(len(row["reason"]) > 20 for row in mutants.read(mutants.KEPT / "equivalent.csv"))
