@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from keystab.provenance import archive, archive_contents, run_comparison
+from keystab.provenance import archive, archive_contents, run_comparison, unpacking
 from keystab.provenance.lineage import file_digest
 from keystab.provenance.snakemake_records import FOLDER
 
@@ -203,3 +204,58 @@ def test_chunks_of_a_picture_are_counted_one_by_one(tmp_path, monkeypatch):
     for most, many in ((7, True), (8, False)):
         monkeypatch.setattr(run_comparison, "_MOST_CHUNKS", most)
         assert run_comparison._has_many_chunks(tmp_path / "a.png") == many
+
+
+# Members of an archive, and the list of what is not in it
+
+
+@pytest.mark.parametrize(
+    ("mode", "good"),
+    [
+        (0, True), (0o100644, True), (0o100755, True), (0o644, True),
+        *((kind, False) for kind in (0o120777, 0o040755, 0o010644, 0o020644, 0o060644, 0o140644)),
+        (0o104755, False), (0o102755, False), (0o101755, False),
+    ],
+)  # fmt: skip
+def test_members_are_plain_files(mode, good):
+    member = zipfile.ZipInfo("docs/a.md")
+    member.external_attr = mode << 16
+    said = unpacking._problem(member)
+    assert said == ("" if good else "is a link or a device; make archive writes files only")
+
+
+@pytest.mark.parametrize(
+    ("name", "good"),
+    [
+        ("a/b.md", True), ("a.b/c d.md", True), ("a:b", False), ("d/a:b", True), ("../a", False),
+        ("a/../b", False), ("a/./b", False), ("/a", False), ("a//b", False), ("a\\b", False),
+        ("a/", False), ("a\n", False), (255 * "a", True), (256 * "a", False),
+    ],
+)  # fmt: skip
+def test_members_have_names_of_files_within_a_folder(name, good):
+    assert (unpacking._problem(zipfile.ZipInfo(name)) == "") == good
+
+
+def test_what_is_left_out_has_the_digest_that_it_has_or_had(tmp_path):
+    for name, data in (
+        ("out/there.csv", b"12345"),
+        ("out/store/a", b"1"),
+        ("out/store/b/c", b"22"),
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(data)
+    (tmp_path / "out/store.sha256").write_text("checksums")
+    names = ["out/there.csv", "out/store", "out/gone.csv", "out/never.csv"]
+    recorded = {"out/there.csv": "a" * 64, "out/gone.csv": "b" * 64}
+    contents = SimpleNamespace(
+        study=SimpleNamespace(project=tmp_path), records={"x": record("match", (), recorded)}
+    )
+    outputs = [SimpleNamespace(path=name, rule="rule") for name in names]
+    rows = [it.split(",") for it in archive._listed(outputs, contents).splitlines()]
+    assert rows == [
+        ["path", "bytes", "sha256", "rule"],
+        ["out/there.csv", "5", file_digest(tmp_path / "out/there.csv"), "rule"],
+        ["out/store", "3", file_digest(tmp_path / "out/store.sha256"), "rule"],
+        ["out/gone.csv", "0", "b" * 64, "rule"],
+        ["out/never.csv", "0", "", "rule"],
+    ]

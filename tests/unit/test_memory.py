@@ -105,3 +105,11 @@ def test_units_begin_at_their_size():
     assert [memory.in_words(it) for it in (999, 1000, 999_499, 1e6, 1e9, 1e12)] == [
         "999 bytes", "1 kB", "999 kB", "1 MB", "1 GB", "1 TB",
     ]  # fmt: skip
+
+
+def test_a_limit_of_addresses_is_the_soft_one_and_none_where_there_is_no_end(monkeypatch):
+    import resource
+
+    for soft, expected in ((resource.RLIM_INFINITY, None), (10**9, 10**9), (0, 0)):
+        monkeypatch.setattr(resource, "getrlimit", lambda kind, soft=soft: (soft, 7 * 10**9))
+        assert memory.reserved() == expected
