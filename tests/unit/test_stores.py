@@ -328,3 +328,22 @@ def test_damaged_and_missing_views_are_found(tmp_path):
     chunk.unlink()
     with pytest.raises(InputError, match="image/c/1/0/0 is missing"):
         view_store.open_views(tmp_path)
+
+
+def test_a_store_that_lacks_a_part_is_named_by_that_part_alone(store):
+    shutil.rmtree(store / "data.zarr/sigma")
+    with pytest.raises(InputError) as raised:
+        scale_space_store.open_scale_space(store)
+    said = f"{store / 'data.zarr/sigma'} is missing; delete the store and make it again"
+    assert str(raised.value) == said
+
+
+def test_views_are_stored_in_the_types_that_are_named(tmp_path):
+    spec = ViewSpec(1.1, 2.0, (4, 6))
+    for dtype in ("float16", "int32", "f4"):
+        with pytest.raises(InputError, match=f"not as {dtype}"):
+            view_store.write_views([np.zeros((4, 6))], [spec], tmp_path / "a", {}, dtype)
+    about = {"set": "a", "reference_blur": 0.0, "reference_shape": [40, 60]}
+    for dtype in ("float32", "float64"):
+        view_store.write_views([np.zeros((4, 6))], [spec], tmp_path / dtype, about, dtype)
+        assert view_store.Views(tmp_path / dtype).reference_shape == (40, 60)
