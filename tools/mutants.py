@@ -35,6 +35,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import psutil
 from mutations import Change, applied, changes
 
 import keystab
@@ -205,9 +206,7 @@ def pytest(words: Sequence[str], loops: Path, limit: float) -> tuple[str, float]
     except subprocess.TimeoutExpired:
         return "does not end", time.monotonic() - begin
     finally:  # of a run that was stopped too: nothing goes on behind it
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        _end(process)
     seconds = time.monotonic() - begin
     if process.returncode in (0, 5):
         return "", seconds
@@ -215,6 +214,17 @@ def pytest(words: Sequence[str], loops: Path, limit: float) -> tuple[str, float]
         raise SystemExit(said)
     failed = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", said, re.MULTILINE)
     return failed[1] if failed else said.strip().splitlines()[-1], seconds
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a run of tests with all that it started, in sessions of their own too."""
+    with contextlib.suppress(psutil.Error):
+        for child in psutil.Process(process.pid).children(recursive=True):
+            with contextlib.suppress(psutil.Error):
+                child.kill()
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
 
 
 def costs() -> tuple[dict[str, float], list[str]]:
