@@ -34,7 +34,7 @@ NO_WITH = $(if $(WITH),$(error drafts are of the default picture; for one of you
     of their own in $(WITH) and type: make study WITH="config/quick.yaml $(WITH)"))
 
 .DEFAULT_GOAL := help
-.PHONY: help study quick report audit scenes docs archive verify reference test test-slow bench check check-workflow format lock why clean environment FORCE
+.PHONY: help study quick report audit scenes docs archive verify reference test test-slow mutants bench check check-workflow format lock why clean environment FORCE
 
 help: ## List the targets
 	@echo "make study                  the whole study"
@@ -76,6 +76,10 @@ test: environment ## The tests, in some minutes
 
 test-slow: environment ## The tests that take minutes: twenty kills of the draft, a cluster
 	pytest -m slow
+
+mutants: environment ## Which of 300 wrong lines do the tests notice, in hours; goes on where it stopped
+	python tools/mutants.py run --all
+	python tools/mutants.py table
 
 archive: environment ## Pack the finished study into one file, results/archive/keystab-VERSION.zip
 	keystab archive $(OVERLAY)

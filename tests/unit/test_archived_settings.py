@@ -16,7 +16,12 @@ from PIL import Image
 
 from keystab import __version__
 from keystab.errors import InputError
-from keystab.provenance.archived_settings import _check_picture, plain_settings, settings_of
+from keystab.provenance.archived_settings import (
+    _MOST_PAGES,
+    _check_picture,
+    plain_settings,
+    settings_of,
+)
 from keystab.provenance.run_description import About
 from keystab.provenance.unpacking import Unpacked
 
@@ -130,3 +135,34 @@ def test_stacks_of_pictures_are_refused(tmp_path):
     tifffile.imwrite(tmp_path / "a.tif", np.zeros((30, 9, 9)), photometric="minisblack")
     with pytest.raises(InputError, match="a.tif: no PNG, JPEG or TIFF that holds one picture"):
         _check_picture(tmp_path / "a.tif", "a.tif")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"GIF89a" + bytes(30),
+        b"%!PS-Adobe",
+        b"\x89PNG\r\n\x1a",
+        b"\xff\xd8\xfe\xe0",
+        b"II\0*" + bytes(30),
+    ],
+)
+def test_what_begins_as_no_known_picture_is_refused(data, tmp_path):
+    (tmp_path / "a.tif").write_bytes(data)
+    with pytest.raises(InputError, match="a.tif: no PNG, JPEG or TIFF that holds one picture"):
+        _check_picture(tmp_path / "a.tif", "a.tif")
+
+
+@pytest.mark.parametrize("options", [{}, {"bigtiff": True}, {"byteorder": ">"}])
+def test_a_tiff_has_as_many_pages_as_allowed_and_no_more(options, tmp_path):
+    for n in (_MOST_PAGES, _MOST_PAGES + 1):
+        path = tmp_path / f"{n}.tif"
+        with tifffile.TiffWriter(path, **options) as writer:
+            for _ in range(n):
+                writer.write(np.zeros((9, 9), np.uint8), photometric="minisblack", contiguous=False)
+        if n == _MOST_PAGES:
+            _check_picture(path, "a.tif")
+        else:
+            with pytest.raises(InputError, match="that holds one picture"):
+                _check_picture(path, "a.tif")

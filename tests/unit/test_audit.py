@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,12 +16,14 @@ import pytest
 from scipy import ndimage
 
 from keystab import __version__
+from keystab.audit import measures
 from keystab.audit.conditions import (
     BLUR,
     CONDITIONS,
     HIGH,
     KAPPA,
     LOW,
+    MARGIN,
     PLAN,
     QUICK,
     SPAN,
@@ -47,6 +50,7 @@ from keystab.audit.run import (
 )
 from keystab.audit.worker import columns_of
 from keystab.camera.simulation import Scene
+from keystab.camera.views import ViewSpec
 from keystab.cli.main import main
 from keystab.errors import InputError
 from keystab.io.keypoint_conventions import KEYSTAB, Convention
@@ -715,3 +719,61 @@ def test_the_figure_says_what_lies_beyond_and_what_failed(controls):
     dots = axes["e"].lines[0].get_xdata()
     assert dots[0] == 100 * turned.loc[names[0], "repeatability_1"]
     assert dots[3] == 100 * turned.loc[names[3], "repeatability_1"]
+
+
+# Limits, and height for width
+
+
+def test_a_large_picture_is_seen_from_so_far_that_its_width_is_that_of_the_views():
+    plan = AuditPlan(60, 2, 4)
+    span = scene_of(np.zeros((500, 550)), plan).shape[1]  # of any large one
+    for width in (700, 900):
+        assert scene_of(np.zeros((900, width)), plan).shape[1] == pytest.approx(span, abs=1)
+    high = scene_of(np.zeros((1100, 550)), plan).shape
+    assert high[1] == span and high[0] == pytest.approx(2 * high[1], abs=2)
+
+
+def test_how_large_a_picture_must_be_is_said_in_its_own_pixels():
+    plan = AuditPlan(60, 2, 4)
+    with pytest.raises(InputError) as small:
+        scene_of(np.zeros((300, 390)), plan)
+    with pytest.raises(InputError) as large:  # seen from twice as far
+        scene_of(np.zeros((300, 2 * 407)), plan)
+    (few,), (many,) = (
+        {int(it) for it in re.findall(r"at least (\d+) x", str(each.value))}
+        for each in (small, large)
+    )
+    assert many == pytest.approx(2 * few, rel=0.01)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_what_is_compared_begins_on_the_margin(stage, axis):
+    spec = views_of_size(stage)
+    middle = [(size - 1) / 2 for size in spec.shape]
+    for at, inside in (
+        (MARGIN, True), (MARGIN - 1e-6, False),
+        (spec.shape[axis] - 1 - MARGIN, True), (spec.shape[axis] - 1 - MARGIN + 1e-6, False),
+    ):  # fmt: skip
+        position = list(middle)
+        position[axis] = at
+        y, x = (np.array([it]) for it in position)
+        assert stage.compared(spec, y, x).tolist() == [inside]
+
+
+def views_of_size(stage):
+    """A view in the middle of the scene, oblong, with room around it for the scene's margin."""
+    return ViewSpec(BLUR, STEP, (int(2 * MARGIN) + 7, int(2 * MARGIN) + 12))
+
+
+def test_a_scale_on_the_end_of_two_octaves_is_of_the_upper_one(monkeypatch):
+    sigma = np.array([1.4, 2.0, 2.8, 2.8, 4.0, 5.6])
+    pairs = SimpleNamespace(sigma=sigma, error=np.zeros((6, 2)), scale=np.zeros(6))
+    monkeypatch.setattr(measures, "_recalled", lambda seen: (sigma, np.ones(6, bool), None))
+    rows = [measures._octave(low, 2 * low, [], pairs) for low in (1.4, 2.8)]
+    assert [row["n"] for row in rows] == [2, 3]
+    assert [row["recall"] for row in rows] == [1.0, 1.0]
+    # Found are those on the lower ends alone: one of two and two of three.
+    on_end = np.isin(sigma, [1.4, 2.8])
+    monkeypatch.setattr(measures, "_recalled", lambda seen: (sigma, on_end, None))
+    rows = [measures._octave(low, 2 * low, [], pairs) for low in (1.4, 2.8)]
+    assert [row["recall"] for row in rows] == pytest.approx([1 / 2, 2 / 3])

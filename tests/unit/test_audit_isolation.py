@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from keystab.audit import isolation
 from keystab.audit.detectors import Detector, own_detector
 from keystab.audit.isolation import Limits, detections, why_not_there
 from keystab.cli.main import main
@@ -136,3 +137,81 @@ def test_what_fails_with_a_small_picture_may_be_audited(name, here):
 
 def test_a_command_that_fails_with_a_small_picture_may_be_audited(here):
     assert why_not_there(own_detector(f"{sys.executable} none.py {{picture}} {{table}}")) == ""
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock by the wall and one of the processor, which pass when told to."""
+    times = {"wall": 0.0, "processor": 0.0}
+    monkeypatch.setattr(isolation.time, "monotonic", lambda: times["wall"])
+    monkeypatch.setattr(isolation, "_processor_seconds", lambda pid: times["processor"])
+    return times
+
+
+@pytest.mark.parametrize(
+    ("wall", "processor", "problem"),
+    [
+        (10.0, 10.0, ""),  # on the limit
+        (10.1, 10.1, "it took more than 10 s"),
+        (49.9, 9.9, ""),  # it waited, or had no processor
+        (50.0, 0.0, ""),
+        (50.1, 0.0, "it took more than 50 s by the clock"),
+        (9.0, 30.0, ""),  # several threads within the time of one
+        (20.0, 30.0, "it took more than 10 s"),
+    ],
+)
+def test_time_is_that_of_the_processor_and_by_the_clock_at_most_five_times_as_much(
+    clock, wall, processor, problem
+):
+    taken = isolation._Time(1, 5.0)
+    taken.restart(10.0)
+    clock["wall"], clock["processor"] = wall, processor
+    assert taken.problem() == problem
+
+
+def test_where_the_processor_is_not_known_the_clock_counts(clock):
+    clock["processor"] = None
+    taken = isolation._Time(1, 5.0)
+    taken.restart(10.0)
+    clock["wall"] = 10.1
+    assert taken.problem() == "it took more than 10 s" and taken.taken() == 10.1
+
+
+def test_time_counts_from_the_last_restart(clock):
+    taken = isolation._Time(1, 5.0)
+    clock["wall"] = clock["processor"] = 100.0
+    taken.restart(10.0)
+    assert taken.problem() == "" and taken.taken() == 0
+    clock["wall"] = clock["processor"] = 110.5
+    assert taken.problem() == "it took more than 10 s"
+
+
+GOOD = {name: np.arange(1.0, 4.0) for name in ("y", "x", "scale")}
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({}, ""),
+        ({name: np.zeros(0) for name in GOOD}, "it found nothing"),
+        ({"y": np.array([1.0, np.nan, 2.0])}, "1 of 3 keypoints are at NaN or infinity"),
+        ({"x": np.array([1.0, np.inf, np.nan])}, "2 of 3 keypoints are at NaN or infinity"),
+        ({"scale": np.array([1.0, 0.0, 2.0])}, "1 of 3 keypoints have no scale above 0"),
+        ({"scale": np.array([-1.0, 0.0, 2.0])}, "2 of 3 keypoints have no scale above 0"),
+        ({"value": np.zeros(2)}, "its columns have different lengths"),
+        ({"value": np.zeros((3, 1))}, "its columns are no lists of numbers"),
+        ({"y": np.zeros((3, 1))}, "its columns are no lists of numbers"),
+    ],
+)
+def test_what_a_process_wrote_is_looked_at(change, problem, tmp_path):
+    np.savez(tmp_path / "found.npz", **(GOOD | change))
+    found, _, said = isolation._checked(tmp_path / "found.npz", (4, 5))
+    assert said == problem and (found is None) == (problem not in ("", "it found nothing"))
+
+
+def test_a_picture_has_as_many_keypoints_as_pixels_and_no_more(tmp_path):
+    for n in (6, 7):
+        np.savez(tmp_path / "found.npz", **{name: np.ones(n) for name in GOOD}, seconds=0.5)
+        found, seconds, said = isolation._checked(tmp_path / "found.npz", (2, 3))
+        assert (found is None, seconds) == (n == 7, 0.5)
+        assert ("more than the picture has pixels" in said) == (n == 7)

@@ -379,6 +379,9 @@ def test_a_wrong_claim_is_refused_in_one_line(changes, says):
     [
         ({"table": "../rates"}, "no name of a table"),
         ({"table": []}, "name one table"),
+        ({"table": {"rates": 1}}, "name one table"),
+        ({"table": ["rates", 3]}, "table: 3 is no name of a table"),
+        ({"table": ["rates", "rates.csv"]}, "'rates.csv' is no name of a table"),
         ({"take": "most"}, "take: 'most', allowed is one, mean"),
         ({"take": "first"}, "take: 'first'"),
         ({"take": "mean n_spo"}, "take: 'mean n_spo'"),
@@ -525,3 +528,9 @@ def test_a_table_that_claims_ask_for_and_is_not_given_is_named(tmp_path, capsys)
         arguments += [f"--{kind}", str(tmp_path / kind)]
     assert check_claims.main(arguments) == 2
     assert "asks for rates.csv: name them with --tables" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["2nd", "a b", "", 3, None, "max", "class-1"])
+def test_what_cannot_be_the_name_of_a_number_is_refused(name):
+    with pytest.raises(InputError, match="cannot be the name of a number"):
+        claim(value={name: ENTRY["value"]["coarse"]}, criterion="1 > 0")

@@ -365,3 +365,139 @@ def test_a_reader_that_stops_early_is_no_error(picture):
     command = f"{sys.executable} -m keystab.cli detect {picture} --camera-blur 0.8 | true"
     run = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
     assert "Traceback" not in run.stderr and "BrokenPipe" not in run.stderr
+
+
+def run_on(capsys, *words):
+    """What a command says on standard error."""
+    assert cli.main([*map(str, words)]) == 0
+    return capsys.readouterr().err
+
+
+def test_a_scene_has_the_height_and_width_that_are_asked_for(tmp_path, capsys):
+    out = tmp_path / "scene.npy"
+    said = run_on(capsys, "scene", "dead-leaves", "-o", out, "--shape", "40", "64")
+    assert read_picture(out).shape == (40, 64)
+    assert "40 x 64 pixels, dead-leaves" in said
+
+
+@pytest.mark.parametrize(
+    ("n_oct", "words"),
+    [
+        ("1", " in 1 octave (--n-oct all for more), "),
+        ("2", " in 2 octaves, "),
+        ("all", " in all octaves, "),
+    ],
+)
+def test_how_many_octaves_were_searched_is_said(picture, tmp_path, capsys, n_oct, words):
+    out = tmp_path / "found.csv"
+    said = run_on(capsys, "detect", picture, *BLUR.split(), "--n-oct", n_oct, "-o", out)
+    assert words in said
+
+
+def test_only_what_a_png_cannot_hold_is_said_to_be_clipped(tmp_path, capsys):
+    dark, bright = tmp_path / "dark.npy", tmp_path / "bright.npy"
+    write_picture(np.full((20, 30), 0.5), dark)
+    write_picture(np.full((20, 30), 1.5), bright)
+    for picture, name, clipped in (
+        (dark, "a.png", False), (bright, "b.npy", False), (bright, "c.png", True),
+    ):  # fmt: skip
+        view = ("simulate", picture, tmp_path / name, "--blur", "0.8", "--step", "1")
+        said = run_on(capsys, *view)
+        assert ("clipped to [0, 1]" in said) == clipped
+
+
+def test_a_view_never_takes_the_place_of_its_picture_by_whatever_name(picture, tmp_path, capsys):
+    before = picture.read_bytes()
+    (tmp_path / "link.npy").symlink_to(picture)
+    for out in (picture, tmp_path / "link.npy"):
+        assert cli.main(["simulate", str(picture), str(out), "--blur", "1", "--step", "1"]) == 2
+        assert "is the picture itself" in capsys.readouterr().err
+    assert picture.read_bytes() == before
+    (tmp_path / "other.npy").write_bytes(before)  # another file of the same bytes is another one
+    out = str(tmp_path / "other.npy")
+    assert cli.main(["simulate", str(picture), out, "--blur", "1", "--step", "1"]) == 0
+
+
+def test_the_summary_counts_what_the_table_holds(tmp_path):
+    from argparse import Namespace
+
+    from keystab.cli import library
+
+    found = pd.DataFrame(
+        {
+            "sign": [1.0, -1.0, -1.0, -1.0],
+            "sigma": [1.0, 2.0, 4.0, 9.0],
+            "std_y": [0.1, 0.4, 0.1, 0.6],
+            "std_x": [0.3, 0.2, 0.2, 0.1],
+            "std_log_sigma": [math.log(1.1)] * 4,
+            "survival": [0.95, 0.9, 0.5, 0.4],
+            "noise": [0.01] * 4,
+        }
+    )
+    # The larger of both deviations of each: 0.3, 0.4, 0.2, 0.6.
+    said = library._summary(Namespace(noise=None, output="t.csv", draw=None), found).splitlines()
+    words = {line[:16].strip(): line[16:].strip() for line in said}
+    assert words["maxima, minima"] == "1, 3"
+    assert words["sigma"] == "1 to 9 px, half of them below 3"
+    assert words["position"].startswith(
+        "half have a standard deviation below 0.35 px, nine tenths below 0.54"
+    )
+    assert words["scale"] == "half below 10.0%"
+    assert words["survival"] == "25% above 0.9, 25% below 0.5"
+    assert words["noise"] == "0.01, estimated from the picture"
+    given = library._summary(Namespace(noise=0.01, output=None, draw=None), found)
+    assert given.endswith("draws them") and "0.01, as given" in given
+    bare = library._summary(
+        Namespace(noise=None, output="t.csv", draw=None), found[["sign", "sigma"]]
+    )
+    assert "survival" not in bare and "1, 3" in bare
+    assert library._summary(Namespace(noise=None, output="t.csv", draw=None), found[:0]) == ""
+
+
+@pytest.mark.parametrize(
+    ("flag", "text", "value"),
+    [
+        ("--camera-blur", "auto", "auto"),
+        ("--camera-blur", "0.75", 0.75),
+        ("--camera-blur", "blurred", None),
+        ("--n-oct", "all", "all"),
+        ("--n-oct", "3", 3),
+        ("--n-oct", "3.5", None),
+        ("--max-iterations", "4", 4.0),
+        ("--max-iterations", "inf", math.inf),
+        ("--max-iterations", "2.5", None),
+        ("--noise", "0.01", 0.01),
+        ("--noise", "0.01 0.02", (0.01, 0.02)),
+        ("--noise", "0.01 0.02 0.03", None),
+    ],
+)
+def test_words_of_the_command_line_become_values(flag, text, value, capsys):
+    words = ["uncertainty", "p.png", "--camera-blur", "1", flag, *text.split()]
+    if value is None:
+        with pytest.raises(SystemExit):
+            build_parser().parse_args(words)
+        assert f"argument {flag}" in capsys.readouterr().err
+    else:
+        given = getattr(build_parser().parse_args(words), flag[2:].replace("-", "_"))
+        assert given == value and type(given) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "good"),
+    [("5", True), ("1e-3", True), ("0", False), ("-1", False), ("inf", False), ("x", False)],
+)
+def test_seconds_of_an_audit_are_above_zero(text, good, capsys):
+    words = ["audit", "mine:detect", "-o", "out", "--time-limit", text]
+    if good:
+        assert build_parser().parse_args(words).time_limit == float(text)
+    else:
+        with pytest.raises(SystemExit):
+            build_parser().parse_args(words)
+        assert "is no time" in capsys.readouterr().err
+
+
+def test_each_command_samples_as_its_question_needs():
+    plain = ["p.png", "--camera-blur", "1"]
+    for command, n_spo, n_oct in (("detect", 3, 1), ("uncertainty", 15, "all")):
+        given = build_parser().parse_args([command, *plain])
+        assert (given.n_spo, given.n_oct) == (n_spo, n_oct)

@@ -237,3 +237,41 @@ def test_every_stage_and_figure_of_the_study_can_be_followed():
         "keystab.stages.simulate"
     )
     assert "keystab.detection.detector" not in code_digest.imported_modules("keystab.figures.fig1")
+
+
+@pytest.mark.parametrize(
+    ("bound", "name"),
+    [
+        ("from toy.base import double", "double"),
+        ("from toy.base import double as twice", "twice"),
+        ("import os", "os"),
+        ("import os as system", "system"),
+        ("def twice(x): return x", "twice"),
+        ("class Thing: ...", "Thing"),
+        ("first, (second, *rest) = 1, (2, 3)", "rest"),
+        ("if True:\n    inner = 1", "inner"),
+    ],
+)
+def test_every_way_to_bind_a_name_in_a_package_can_be_followed_and_no_other_name(toy, bound, name):
+    (toy / "stages/__init__.py").write_text(bound + "\n")
+    user = toy / "user.py"
+    user.write_text(f"from toy.stages import {name}\n")
+    code_digest._names_in.cache_clear()
+    assert "toy.stages" in code_digest.imported_modules("toy.user", toy)
+    user.write_text("from toy.stages import other\n")
+    code_digest._read.cache_clear()
+    with pytest.raises(ValueError, match="imports other from toy.stages"):
+        code_digest.imported_modules("toy.user", toy)
+
+
+def test_what_runs_where_types_are_not_checked_counts(toy):
+    work = toy / "stages/work.py"
+    work.write_text(
+        "from typing import TYPE_CHECKING\nimport typing\n"
+        "if typing.TYPE_CHECKING:\n    from toy.types_only import Thing\n"
+        "else:\n    from toy.alone import VALUE\n"
+        "match 1:\n    case 1:\n        from toy import late\n"
+    )
+    code_digest._read.cache_clear()
+    found = code_digest.imported_modules("toy.stages.work", toy)
+    assert found == ["toy.alone", "toy.late", "toy.stages", "toy.stages.work"]

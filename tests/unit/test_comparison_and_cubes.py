@@ -159,3 +159,20 @@ def test_cubes_are_drawn_only_where_they_fit(blob_space):
     assert set(chosen["keypoint"]) <= set(again["keypoint"])
     with pytest.raises(InputError, match="no unstable keypoint"):
         drawn(keypoints[keypoints["stability"] > 0.2], blob_space, 0.8, 0.2, per_group=5)
+
+
+def test_drawn_keypoints_are_the_most_stable_first_and_of_the_same_by_their_numbers(blob_space):
+    n = 40
+    keypoints = pd.DataFrame(
+        {
+            "keypoint": np.arange(n)[::-1],
+            "y": 20.0,
+            "x": 20.0,
+            "sigma": 1.6,
+            "stability": np.tile([0.1, 0.85, 0.0, 1.0], n // 4),
+        }
+    )
+    chosen = drawn(keypoints, blob_space, 0.8, 0.2, per_group=8)
+    for _, group in chosen.groupby("group"):
+        ranked = list(zip(-group["stability"], group["keypoint"], strict=True))
+        assert ranked == sorted(ranked) and group["stability"].nunique() == 2

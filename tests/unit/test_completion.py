@@ -86,3 +86,29 @@ def test_shells_can_read_their_script(shell, tmp_path):
         [shell, "-n", str(tmp_path / "script")], capture_output=True, text=True
     )  # fmt: skip
     assert (run.returncode, run.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_files_are_offered_where_a_command_takes_them_and_nowhere_else(shell):
+    lines = script(shell, PARSER).splitlines()
+
+    def of(command, flag):
+        if shell == "fish":
+            return next(it for it in lines if f"from {command}'" in it and f" -l {flag} " in it)
+        start = lines.index(f"    {command})")
+        return next(it for it in lines[start:] if f"'--{flag}[" in it)
+
+    sign = " -F" if shell == "fish" else "_files"
+    for command, flag in (("detect", "output"), ("detect", "draw"), ("scene", "output")):
+        assert sign in of(command, flag)
+    for command, flag in (("detect", "n-oct"), ("scene", "seed"), ("audit", "time-limit")):
+        assert sign not in of(command, flag)
+
+
+def test_fish_offers_files_where_one_of_several_words_may_be_a_file():
+    whole = {line for line in script("fish", PARSER).splitlines() if line.endswith(" -F")}
+    named = {
+        line.split("seen_subcommand_from ")[1].split("'")[0] for line in whole if " -l " not in line
+    }
+    assert {"detect", "truth", "uncertainty", "simulate"} <= named
+    assert "scene" not in named  # KIND is one of a few words

@@ -71,6 +71,7 @@ ROW = {"name": "a", "family": "lakes", "kind": "text", "seed": 1, "sha256": "ab"
         ({"path": "a.png"}, "a photograph has a path"),
         ({"sha256": "12"}, "64 hexadecimal"),
         ({"seed": 0.5}, "whole number"),
+        ({"seed": -1}, "whole number of at least 0"),
         ({"angle": "steep"}, "numbers or empty"),
     ],
 )
@@ -259,3 +260,10 @@ def test_a_scene_lies_where_its_picture_does(tmp_path):
     found = corpus.places(CORPUS, scenes)
     assert found["lake"] == "" and found["text_1"] == "scenes/text_1/"
     assert corpus.judged(CORPUS, scenes, str(tmp_path)) == {}
+
+
+@pytest.mark.parametrize("seed", [0, 1, None])
+def test_seeds_begin_at_0_which_is_that_of_whoever_gives_none(seed, tmp_path):
+    row = {**dict.fromkeys(corpus.COLUMNS), **ROW, "seed": seed}
+    write_table(pd.DataFrame([row]), tmp_path / "scenes.csv")
+    assert corpus.read_corpus(tmp_path / "scenes.csv")["a"].seed == (seed or 0)

@@ -169,3 +169,21 @@ def test_nullable_columns_are_numbers():
     table = pd.DataFrame({"y": [0.0, 0.5], "x": 0.0, "sigma": 1.1})
     np.testing.assert_array_equal(pairs_within(table.convert_dtypes()), pairs_within(table))
     assert len(pairs_within(table.astype(object))) == 1
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("row", [0, 1, 2])
+@pytest.mark.parametrize("name", ["y", "x", "sigma"])
+def test_the_one_row_that_is_wrong_is_named(name, row, bad):
+    table = pd.DataFrame({"y": [0.0, 1.0, 2.0], "x": 0.0, "sigma": 1.1})
+    table.loc[row, name] = bad
+    with pytest.raises(InputError, match=f"column '{name}' holds {bad} in row {row},"):
+        pairs_within(table)
+
+
+def test_tolerances_begin_right_above_their_limits():
+    apart = pd.DataFrame({"y": [0.0, 0.0], "x": 0.0, "sigma": [1.0, 1.0]})
+    assert len(pairs_within(apart, space_tolerance=1e-9, scale_ratio=1 + 1e-9)) == 1
+    for limits in ({"space_tolerance": -1e-9}, {"scale_ratio": 1 - 1e-9}, {"scale_ratio": 0.7}):
+        with pytest.raises(InputError, match="raise it"):
+            pairs_within(apart, **limits)

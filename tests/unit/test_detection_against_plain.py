@@ -170,3 +170,52 @@ def test_cubes_threads_and_bands_change_no_digit(oversampling, n_spo, monkeypatc
     assert extrema_table(space, found, cubes).equals(extrema_table(space, found))
     monkeypatch.setattr(extrema, "BAND_ROWS", 100)
     np.testing.assert_array_equal(found, extrema.discrete_extrema(space, window=window))
+
+
+NEIGHBOURS = [it for it in np.ndindex(3, 3, 3) if it != (1, 1, 1)]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("epsilon", [0.0, 1.0])
+def test_an_extremum_differs_by_more_than_epsilon_from_each_neighbour(sign, epsilon):
+    for place in NEIGHBOURS:
+        for gap in (epsilon, 1.005 * epsilon + 0.005):
+            samples = np.zeros((3, 3, 3))
+            samples[1, 1, 1] = 2.0 * sign
+            samples[place] = (2.0 - gap) * sign
+            found = extrema.extrema_of_array(samples, epsilon, (10, 20)).tolist()
+            assert found == ([[1, 11, 21, sign]] if gap > epsilon else []), place
+
+
+def test_extrema_keep_their_places_where_axes_swap_or_turn_around():
+    # An array of three sizes: no axis can be taken for another.
+    samples = np.random.default_rng(5).integers(0, 40, (6, 9, 14)).astype(float)  # with ties
+    plain = {tuple(it) for it in extrema.extrema_of_array(samples, 0.0)}
+    turned = extrema.extrema_of_array(np.ascontiguousarray(samples.transpose(0, 2, 1)), 0.0)
+    assert len(plain) > 15 and {(s, x, y, sign) for s, y, x, sign in turned.tolist()} == plain
+    for axis in range(3):
+        mirrored = extrema.extrema_of_array(np.ascontiguousarray(np.flip(samples, axis)), 0.0)
+        mirrored[:, axis] = samples.shape[axis] - 1 - mirrored[:, axis]
+        assert {tuple(it) for it in mirrored} == plain
+    negated = extrema.extrema_of_array(-samples, 0.0) * [1, 1, 1, -1]
+    assert {tuple(it) for it in negated} == plain
+
+
+@pytest.mark.parametrize("oversampling", ["spline", "cosine"])
+def test_a_window_holds_the_extrema_of_its_samples_from_its_first_to_before_its_last(oversampling):
+    space = scale_space(blobs((30, 44), 3), 1.1, 8, oversampling=oversampling)
+    whole = extrema.discrete_extrema(space)
+    for s, y, x, sign in whole[:: max(1, len(whole) // 6)].tolist():
+        found = [
+            [s, y, x, sign] in extrema.discrete_extrema(space, window=window).tolist()
+            for window in (
+                (slice(y, y + 1), slice(x, x + 1)),
+                (slice(y + 1, y + 9), slice(x, x + 9)),
+                (slice(y, y + 9), slice(x + 1, x + 9)),
+                (slice(max(y - 9, 0), y), slice(x, x + 1)),
+                (slice(y, y + 1), slice(max(x - 9, 0), x)),
+            )
+        ]
+        assert found == [True, False, False, False, False]
+    empty = (slice(20, 20), slice(0, 40))
+    assert extrema.discrete_extrema(space, window=empty).shape == (0, 4)

@@ -14,6 +14,7 @@ from keystab.camera.simulation import simulate_view
 from keystab.camera.views import ViewSpec
 from keystab.detection.detector import detect_keypoints
 from keystab.detection.extrema import discrete_extrema
+from keystab.detection.refinement import accepted
 from keystab.errors import InputError
 from keystab.io.pictures import write_picture
 from keystab.scalespace.dog import scale_space
@@ -396,3 +397,50 @@ def test_what_is_masked_is_not_taken_for_seen(mask, tmp_path):
         with pytest.raises(InputError, match=rf"{np.sum(masked.mask)} masked values"):
             use()
     assert list(tmp_path.iterdir()) == []
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    seed=st.integers(0, 2**31), n_spo=st.integers(3, 9), mode=st.sampled_from(["spline", "cosine"])
+)
+def test_a_transposed_picture_has_transposed_keypoints(seed, n_spo, mode):
+    image = blobs((22, 37), seed)  # oblong: no axis can stand for the other
+    plain, turned = (detect_keypoints(it, 1.1, n_spo, oversampling=mode) for it in (image, image.T))
+    assert len(plain) == len(turned)
+    order = np.lexsort((turned["row"], turned["column"], turned["s"], turned["octave"]))
+    before = plain.sort_values(["octave", "s", "row", "column"])
+    for names in (("y", "x", "sigma", "value", "sign"), ("row", "column", "s", "octave")):
+        swapped = [
+            {"y": "x", "x": "y", "row": "column", "column": "row"}.get(it, it) for it in names
+        ]
+        np.testing.assert_allclose(
+            turned.iloc[order][swapped], before[list(names)], rtol=1e-9, atol=1e-7
+        )
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_grey_values_are_allowed_up_to_their_limits(sign):
+    picture = blobs((22, 37), 1)
+    picture /= np.abs(picture).max()
+    n = len(detect_keypoints(picture, 1.1, 3))
+    for largest, allowed in ((1e-90, True), (1e90, True), (0.9e-90, False), (1.1e90, False)):
+        image = sign * largest * picture
+        if allowed:
+            assert len(detect_keypoints(image, 1.1, 3)) == n > 0
+        else:
+            with pytest.raises(InputError, match="allowed are 1e-90 to 1e90"):
+                detect_keypoints(image, 1.1, 3)
+
+
+@pytest.mark.parametrize("name", ["alpha_s", "alpha_y", "alpha_x"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_offset_that_meets_the_largest_one_exactly_is_not_accepted(name, sign):
+    trace = pd.DataFrame({"keypoint": [0, 0, 1, 2, 2], "model": [1, 2, 1, 1, 2]})
+    trace = trace.assign(alpha_s=0.1, alpha_y=-0.2, alpha_x=0.3)
+    trace[name] = sign * np.array([0.6, 0.5999, 0.6, 0.1, 0.2])
+    assert accepted(trace, 0.6, 2)["model"].tolist() == [2, 1]
+    assert accepted(trace, 0.6, 2)["keypoint"].tolist() == [0, 2]
+    assert accepted(trace, 0.6, 1)["keypoint"].tolist() == [2]  # the second model comes too late
+    assert accepted(trace, math.inf, 2)["model"].tolist() == [1, 1, 1]
+    shuffled = trace.iloc[[4, 2, 0, 3, 1]].sort_values("model", kind="stable")
+    assert set(accepted(shuffled, 0.6, 2)["keypoint"]) == {0, 2}

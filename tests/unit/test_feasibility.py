@@ -143,3 +143,21 @@ def test_views_of_a_set():
     assert (second.step, second.shift, second.seed) == (12.0, (0.0, 0.25), ("some", 1))
     with pytest.raises(InputError, match="different lengths"):
         per_view({**views, "noise": [0.0, 0.1, 0.2]})
+
+
+def test_stores_take_eight_bytes_for_each_sample_of_all_views_octaves_and_samplings(monkeypatch):
+    monkeypatch.setattr(picture_checks, "view_shapes", lambda views, shape: [(10, 20), (30, 5)])
+    detector = {"detector": {"kappa": 2 ** (1 / 3), "sigma_min": 1.1}}
+
+    def of(**changes):
+        views = {"sigma_min": None, "n_oct": 1, "n_spo": [3], "delta_min": 0.5} | changes
+        return picture_checks.bytes_of_stores("a", views, (100, 200), detector)
+
+    assert of() == 8 * 350 * 5 * 4  # five slices, four samples in each pixel
+    assert of(n_oct=2) == 1.25 * of()
+    assert of(n_spo=[3, 5]) == of() * (5 + 7) / 5
+    assert of(delta_min=0.25) == 4 * of()
+    balanced = {scale: of(delta_min=None, sigma_min=scale) for scale in (None, 1.1, 2.2)}
+    assert balanced[None] == balanced[1.1]
+    # Steps in proportion to the first scale, but for the balance of the samplings of scale.
+    assert 3 < balanced[1.1] / balanced[2.2] < 5

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-from PIL import Image
+from PIL import Image, PngImagePlugin
 from PIL.PngImagePlugin import PngInfo
 from pypdf import PdfReader, PdfWriter
 
@@ -218,3 +218,22 @@ def test_the_command_of_a_figure_writes_what_it_was_told_and_what_it_read(tmp_pa
     assert main(lambda tables, draft: drawing(), needs, [*flags, "--draft"]) == 0
     by_hand = dataclasses.replace(expected, code=None, lock=None, settings={"draft": "True"})
     assert read_figure_metadata(tmp_path / "fig0.pdf") == by_hand
+
+
+@pytest.mark.parametrize(("height", "width"), [(2, 40), (40, 2), (2, 41), (41, 2)])
+def test_pixels_of_a_large_picture_are_not_decoded_to_find_what_stands_behind(
+    height, width, tmp_path, monkeypatch
+):
+    data, told = io.BytesIO(), PngImagePlugin.PngInfo()
+    told.add_text(PNG_KEY, "not of keystab")
+    Image.fromarray(np.zeros((height, width), np.uint8)).save(data, "png", pnginfo=told)
+    raw = data.getvalue()
+    at = raw.index(b"tEXt") - 4
+    size = int.from_bytes(raw[at : at + 4], "big") + 12
+    behind = raw[:at] + raw[at + size : -12] + raw[at : at + size] + raw[-12:]
+    (tmp_path / "k.png").write_bytes(behind)
+    monkeypatch.setattr("keystab.provenance.lineage._MOST_PIXELS", 80)
+    found = "has no metadata" if height * width > 80 else "no metadata of keystab|draw it again"
+    with pytest.raises(InputError, match=found) as raised:
+        read_figure_metadata(tmp_path / "k.png")
+    assert ("has no metadata" in str(raised.value)) == (height * width > 80)

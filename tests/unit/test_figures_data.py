@@ -30,6 +30,7 @@ from keystab.figures import (
     palette,
     style,
 )
+from keystab.figures._occurrence import occurrence
 from keystab.figures.style import spread
 
 
@@ -778,3 +779,73 @@ def test_figure_s4_names_what_it_cannot_draw():
                 )
             }
         )
+
+
+# Ties and oblong pictures
+
+
+def seen(pixels, step):
+    return fig2.View("one", 1.0, step, np.asarray(pixels, dtype=float))
+
+
+@pytest.mark.parametrize("spot", [(12, 40), (5, 20), (14, 52)])
+def test_the_detail_of_figure_2_is_where_the_coarsest_view_varies_most(spot):
+    coarse, fine = np.zeros((20, 60)), np.zeros((80, 240))
+    coarse[spot] = 1.0  # the finer view has its detail elsewhere, which does not matter
+    fine[40, 60] = 5.0
+    views = [seen(fine, 2.5), seen(coarse, 10.0)]
+    centre, half = fig2._busiest_detail(views)
+    assert_allclose(half, 0.5 * fig2.DETAIL * np.array([200.0, 600.0]))
+    # The window holds the spot, in both axes.
+    assert (np.abs(centre / 10.0 + (np.array(coarse.shape) - 1) / 2 - spot) <= half / 10 + 1).all()
+    transposed = [seen(view.pixels.T, view.step) for view in views]
+    other, its_half = fig2._busiest_detail(transposed)
+    assert_allclose(its_half, half[::-1])
+    y, x = fig2._window(views[1], (centre, half))
+    assert_allclose(fig2._window(transposed[1], (centre[::-1], half[::-1])), (x, y))
+    for (low, high), middle, size, side in zip((y, x), centre, half, coarse.shape, strict=True):
+        assert (low + high) / 2 == pytest.approx((side - 1) / 2 + middle / 10.0)
+        assert high - low == pytest.approx(2 * size / 10.0)
+
+
+def test_the_detail_of_figure_2_lies_in_what_all_views_show():
+    # The coarse view sees more: what varies at its border is seen by no other.
+    coarse = np.zeros((20, 60))
+    coarse[1, 2], coarse[11, 33] = 9.0, 1.0
+    centre, half = fig2._busiest_detail([seen(np.zeros((100, 300)), 1.0), seen(coarse, 10.0)])
+    assert_allclose(half, 0.5 * fig2.DETAIL * np.array([100.0, 300.0]))
+    assert (np.abs(centre) + half <= 0.5 * np.array([100.0, 300.0])).all()
+    assert (np.abs(centre / 10.0 + [9.5, 29.5] - [11, 33]) <= half / 10 + 1).all()
+
+
+def test_the_grid_of_figure_3_has_each_node_once_where_two_samplings_share_a_step():
+    nodes = [(3, 0.5), (5, 0.5), (3, 0.25), (5, 0.25), (5, 0.25), (7, 0.1), (7, 0.5 + 1e-12)]
+    table = pd.DataFrame(nodes, columns=["n_spo", "delta_min"])
+    found = fig3._grid(table)[["n_spo", "delta_min"]].to_numpy().tolist()
+    assert found == [[3, 0.5], [5, 0.5], [3, 0.25], [5, 0.25], [7, 0.5]]
+
+
+def test_keypoints_of_the_same_stability_are_in_the_order_of_the_sets_that_see_them():
+    detected = {0: [0, 1, 1], 1: [1, 1, 0], 2: [1, 1, 1], 3: [1, 0, 1], 4: [0, 0, 0]}
+    rows = [(k, n, d) for k, by in detected.items() for n, d in zip((3, 5, 9), by, strict=True)]
+    detections = pd.DataFrame(rows, columns=["keypoint", "n_spo", "detected"])
+    stability = [2 / 3, 2 / 3, 1.0, 2 / 3, 0.0]
+    keypoints = pd.DataFrame({"keypoint": range(5), "stability": stability})
+    found = occurrence(detections.sample(frac=1, random_state=1), keypoints, "n_spo", "fig4")
+    assert found.sets.tolist() == [3, 5, 9]
+    assert found.detected.T.astype(int).tolist() == list(detected.values())
+    # Means of the sets: 7, 4, -, 6; none at all comes first by its stability.
+    assert found.order.tolist() == [4, 1, 3, 0, 2]
+
+
+def test_curves_of_figure_5_fall_whatever_the_order_of_their_rows():
+    tables = dict(figure_tables.tables(5))
+    roc = tables["fig5_roc"]
+    tables["fig5_roc"] = roc.sample(frac=1, random_state=2)
+    axes = {ax.get_label(): ax for ax in fig5.draw(tables).axes}
+    lines = [it for ax in axes.values() for it in ax.get_lines() if it.get_label() in fig5.PANELS]
+    curves = [it for it in lines if len(it.get_xdata()) == (roc["feature"] == it.get_label()).sum()]
+    assert len(curves) == len(fig5.PANELS)
+    for curve in curves:
+        x, y = (np.asarray(it, float) for it in (curve.get_xdata(), curve.get_ydata()))
+        assert (np.diff(x) >= 0).all() and (np.diff(y) <= 0).all()

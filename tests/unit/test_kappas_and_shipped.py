@@ -71,3 +71,18 @@ def test_contrast_filter_and_its_limits():
     for wrong in ({"contrast": -1.0}, {"edge_ratio": 0.5}, {"contrast": math.nan}):
         with pytest.raises(InputError, match="change it"):
             passes_filters(table, **wrong)
+
+
+def test_an_isotropic_structure_passes_the_smallest_ratio_and_no_contrast_fails():
+    def table(h_yy, h_xx, h_yx=0.0, value=1.0):
+        return pd.DataFrame({"h_yy": [h_yy], "h_xx": [h_xx], "h_yx": [h_yx], "value": [value]})
+
+    for h_yy, h_xx in ((2.0, 3.0), (3.0, 2.0), (-2.0, -3.0)):
+        assert not passes_filters(table(h_yy, h_xx), 0.0, 1.0 + 1e-9).any()
+        assert passes_filters(table(h_yy, h_xx), 0.0, 1.6).all()
+    assert not passes_filters(table(2.0, -2.0), 0.0, math.inf).any()  # a saddle
+    assert not passes_filters(table(1.0, 1.0, 1.0), 0.0, math.inf).any()  # a ridge
+    for sign in (1, -1):  # the sign of an extremum does not decide, and h_yx neither
+        for h_yx in (0.5, -0.5):
+            assert passes_filters(table(1.0, 1.0, h_yx, sign), 0.5, 4.0).all()
+            assert not passes_filters(table(1.0, 1.0, h_yx, sign), 0.5, 2.9).any()  # (1.5 / 0.5)

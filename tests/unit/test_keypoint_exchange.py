@@ -324,3 +324,12 @@ def test_what_cannot_be_written_leaves_nothing(format, database, tmp_path):
         with pytest.raises(InputError):
             write_keypoints(wrong, path, format, image="left.png")
     assert [each.name for each in tmp_path.iterdir()] == ["colmap.db"]
+
+
+@pytest.mark.parametrize("row", [0, 1, 2])
+@pytest.mark.parametrize("name", ["y", "x", "sigma"])
+def test_the_row_that_holds_no_number_is_named(name, row, tmp_path):
+    keypoints = pd.DataFrame({"y": [1.0, 2.0, 3.0], "x": 4.0, "sigma": 1.5})
+    keypoints.loc[row, name] = np.nan
+    with pytest.raises(InputError, match=f"is nan in row {row};"):
+        Convention(0.0, "xy", "sigma").columns(keypoints)

@@ -232,3 +232,12 @@ def test_an_unknown_model_and_wrong_radii_are_named():
         camera("pinhole", 0.5, 2.0, 4.0)
     with pytest.raises(InputError, match="radius: must be a list of finite numbers"):
         psf_profile(Camera(0.5, 2.0, 4.0), [[1.0]])
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_one_wrong_radius_among_right_ones_is_refused(bad, at):
+    radii = [0.0, 1.0, 2.0]
+    radii[at] = bad
+    with pytest.raises(InputError, match="radius: must be a list of finite numbers"):
+        psf_profile(Camera(0.5, 2.0, 4.0), radii)

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from keystab.errors import InputError
-from keystab.figures.overlay import draw_keypoints
+from keystab.figures.overlay import check_drawing, draw_keypoints
 
 PICTURE = np.full((60, 100), 0.5)
 
@@ -98,3 +98,48 @@ def test_what_cannot_be_drawn_is_refused_in_one_line(tmp_path, options, words):
     with pytest.raises(InputError, match=re.escape(words)):
         draw_keypoints(PICTURE, table(), path, **options)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("part", "expected"),
+    [
+        (None, (0, 0, 60, 100)),
+        ((59, 99, 1, 1), (59, 99, 1, 1)),
+        ((59, 99, 7, 9), (59, 99, 1, 1)),
+        ((0, 0, 60, 100), (0, 0, 60, 100)),
+        ((10, 70, 60, 20), (10, 70, 50, 20)),
+        ((60, 0, 1, 1), None),
+        ((0, 100, 1, 1), None),
+        ((-1, 0, 9, 9), None),
+        ((0, -1, 9, 9), None),
+        ((0, 0, 1, 0), None),
+    ],
+)
+def test_a_part_begins_on_the_picture_and_ends_with_it(part, expected):
+    if expected is None:
+        with pytest.raises(InputError, match="lies outside of a picture of 60 x 100 pixels"):
+            check_drawing(PICTURE.shape, part, None)
+    else:
+        assert check_drawing(PICTURE.shape, part, None) == expected
+
+
+@pytest.mark.parametrize("shape", [(60, 100), (100, 60), (3000, 40), (40, 3000)])
+def test_pictures_are_enlarged_or_reduced_by_their_longer_side_alone(shape, tmp_path):
+    draw_keypoints(np.full(shape, 0.5), table(), tmp_path / "k.png")
+    with Image.open(tmp_path / "k.png") as drawing:
+        width, height = drawing.size
+    longer = min(max(*shape, 1200), 2400)
+    zoom = longer / max(shape)
+    assert height == pytest.approx(shape[0] * zoom + 75, abs=1)
+    assert width == pytest.approx(max(shape[1] * zoom, 600), abs=1)
+
+
+def test_black_and_white_are_those_of_the_picture_whatever_its_grey_values(tmp_path):
+    seen = []
+    for low, high in ((0.0, 1.0), (-3.0, 5.0), (0.4, 0.5)):
+        ramp = low + (high - low) * np.tile(np.linspace(0, 1, 100), (60, 1))
+        draw_keypoints(ramp, table(), tmp_path / "k.png")
+        with Image.open(tmp_path / "k.png") as drawing:
+            seen.append(np.asarray(drawing.convert("L"))[20, :1200].astype(int))
+        assert seen[-1][0] < 130 < 240 < seen[-1][-1]
+    assert np.ptp(seen, axis=0).max() <= 1

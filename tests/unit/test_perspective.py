@@ -191,3 +191,31 @@ def test_views_of_one_tilt_are_matched_with_the_first():
     assert of_views(table, members)["view"].tolist() == [0, 1, 2]
     assert label == {"tilt": 40} and of_views(table, others)["view"].tolist() == [0, 1, 1]
     assert of_views(table, range(4)) is table
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("blur", [0.5, 1.1])
+def test_a_view_may_come_as_near_to_the_horizon_as_its_blur_reaches(axis, sign, blur):
+    shape = (10, 16)
+    reach = shape[axis] / 2 + 0.5 + perspective.REACH * blur
+    for factor, allowed in ((0.99, True), (1.01, False)):
+        third = [0.0, 0.0, 1.0]
+        third[axis] = sign * factor / reach
+        plane = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), tuple(third))
+        if allowed:
+            ViewSpec(blur, 2.0, shape, homography=plane)
+        else:
+            with pytest.raises(InputError, match="horizon of the plane"):
+                ViewSpec(blur, 2.0, shape, homography=plane)
+
+
+def test_a_tilted_view_of_a_transposed_scene_is_transposed():
+    scene = np.random.default_rng(4).random((40, 60))
+    plane = np.array([[0.9, 0.1, 0.4], [0.05, 1.1, -0.3], [0.01, -0.006, 1.0]])
+    swap = np.eye(3)[[1, 0, 2]]
+    view = simulate(scene, ViewSpec(0.8, 3.0, (9, 14), (0.7, -1.1), homography=plane))
+    other = simulate(
+        scene.T, ViewSpec(0.8, 3.0, (14, 9), (-1.1, 0.7), homography=swap @ plane @ swap)
+    )
+    np.testing.assert_allclose(other.T, view, atol=1e-6)

@@ -363,3 +363,23 @@ def test_memory_grows_with_the_picture_and_with_rows_of_the_scale_space(small):
     # Three copies of 128 rows of 5 slices of 3000 doubles.
     expected = 600 + math.ceil(3 * 128 * 5 * 3000 * 8 / 1e6)
     assert job_resources.megabytes_of_store(small, "still", "3") == expected
+
+
+def test_time_of_shots_grows_with_pairs_scales_and_kinds_of_noise(small, monkeypatch):
+    looked_at = {"shots": 3_000_000, "moved": 500_000}
+    monkeypatch.setattr(job_resources, "pixels", lambda settings, name: (looked_at[name], 1))
+
+    def seconds(**changes):
+        asked = {
+            "n_pairs": 10, "n_pairs_others": 2, "n_spo": 15, "n_oct": 2, "n_moved": 4,
+            "noise": ["one"],
+        } | changes  # fmt: skip
+        return 60 * (job_resources.minutes_of_shots({"uncertainty": asked}) - 5)
+
+    one = 15e-6 * 15 * 2
+    assert seconds() == pytest.approx(one * (5 * 18 * 3e6 + 8 * 5e5), abs=60)
+    assert seconds(n_pairs=11) - seconds() == pytest.approx(one * 5 * 3e6, abs=60)
+    assert seconds(n_pairs_others=3) - seconds() == pytest.approx(one * 20 * 3e6, abs=60)
+    assert seconds(n_moved=1004) - seconds() == pytest.approx(one * 2000 * 5e5, abs=60)
+    for more in ({"noise": ["one", "two"]}, {"n_spo": 30}, {"n_oct": 4}):
+        assert seconds(**more) == pytest.approx(2 * seconds(), abs=120)

@@ -102,3 +102,49 @@ def test_what_cannot_be_fitted_is_named_in_one_line(picture, options, words):
     with pytest.raises(InputError, match=words) as caught:
         fit_psf(picture, **options)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("y", "x"), [(9.0, 48.5), (12.5, 11.0)])
+def test_the_fit_of_a_transposed_picture_is_transposed(y, x):
+    # Oblong, its bump farther along than the picture is high: no axis can be taken for the other.
+    picture = bump((21, 61), y, x, major=3.2, minor=2.4, angle=0.4)
+    fit, turned = fit_psf(picture), fit_psf(picture.T)
+    assert (fit.y, fit.x) == pytest.approx((y, x), abs=1e-3)
+    assert (turned.y, turned.x) == pytest.approx((fit.x, fit.y), abs=1e-6)
+    same = [(it.blur, it.height, it.residual, it.major, it.minor) for it in (fit, turned)]
+    assert same[0] == pytest.approx(same[1], rel=1e-6)
+    assert np.sin(turned.angle - (np.pi / 2 - fit.angle)) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_mirrored_picture_has_the_mirrored_fit():
+    picture = bump((21, 61), 9.0, 48.5, major=3.2, minor=2.4, angle=0.4)
+    fit, mirrored = fit_psf(picture), fit_psf(picture[:, ::-1])
+    assert (mirrored.y, mirrored.x) == pytest.approx((fit.y, 60 - fit.x), abs=1e-6)
+    assert np.sin(mirrored.angle + fit.angle) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_border_is_the_outermost_sample_of_each_side_and_nothing_else():
+    # 9 samples on each side of the level: one more or less, at any place, and the median moves.
+    picture = np.full((4, 7), 9.0)
+    ring = [(y, x) for y, x in np.ndindex(4, 7) if y in (0, 3) or x in (0, 6)]
+    for number, place in enumerate(ring):
+        picture[place] = number
+    for turned in (picture, picture[::-1], picture[:, ::-1], picture.T, picture.T[::-1]):
+        assert border_level(turned) == 8.5
+    picture[1:3, 1:6] = -9.0
+    assert border_level(picture) == 8.5
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (3, 9), (9, 3), (2, 9), (9, 2)])
+def test_a_picture_has_three_samples_along_each_side_at_least(shape):
+    if min(shape) < 3:
+        with pytest.raises(InputError, match="at least 3 x 3"):
+            border_level(np.ones(shape))
+    else:
+        assert border_level(np.ones(shape)) == 1.0
+
+
+@pytest.mark.parametrize(("y", "x"), [(-1.5, 20.0), (20.0, -1.5), (41.5, 20.0), (20.0, 47.5)])
+def test_a_bump_whose_centre_lies_outside_of_the_picture_is_none(y, x):
+    with pytest.raises(InputError, match="no bump that a Gaussian fits"):
+        fit_psf(bump(y=y, x=x))

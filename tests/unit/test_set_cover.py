@@ -110,3 +110,9 @@ def test_past_a_limit_the_cover_is_valid_and_its_bound_proven(limit):
 def test_nothing_to_cover():
     cover = first_minimum_cover({})
     assert (cover.chosen, cover.lower_bound, cover.canonical) == ([], 0, True)
+
+
+def test_a_cover_of_as_many_candidates_as_allowed_is_proven():
+    candidates = grid(3, 4)
+    assert first_minimum_cover(candidates, size_limit=12).canonical
+    assert not first_minimum_cover(candidates, size_limit=11).canonical

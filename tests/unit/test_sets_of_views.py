@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -19,7 +20,14 @@ from keystab.camera.common_field import (
     windows_of_common_field,
 )
 from keystab.camera.simulation import Scene, simulate
-from keystab.camera.view_sets import expanded, members, per_view, view_shapes, view_specs
+from keystab.camera.view_sets import (
+    assumed_blur,
+    expanded,
+    members,
+    per_view,
+    view_shapes,
+    view_specs,
+)
 from keystab.camera.views import ViewSpec, to_reference, to_view
 from keystab.detection.detector import detect_keypoints
 from keystab.detection.refinement import refined_keypoints
@@ -33,6 +41,8 @@ from keystab.experiments.view_stability import (
 )
 from keystab.matching.common_range import CommonRange
 from keystab.matching.correspondence import matched
+from keystab.parameters import ComparedInViews
+from keystab.stages._compared import common_range
 
 SAME = {"space_tolerance": 1.0, "scale_ratio": 2**0.5, "match_sign": False}
 PLAIN = {
@@ -318,3 +328,47 @@ def test_views_without_a_common_field_have_empty_windows():
     specs = [ViewSpec(1.1, 10.0, (20, 20), (0.0, shift)) for shift in (0.0, 15.0)]
     for top, bottom, left, right in windows_of_common_field(specs, (200, 200), 3):
         assert bottom < top and right < left
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_common_field_begins_on_the_margin_of_each_view_and_ends_on_the_reference(axis):
+    shape = (21, 33)
+    large, small = ViewSpec(1.1, 2.0, shape), ViewSpec(1.1, 2.0, (15, 19))
+    middle = [(size - 1) / 2 for size in shape]
+
+    def inside(specs, reference, margin, at):
+        position = list(middle)
+        position[axis] = at
+        return bool(in_common_field(specs, reference, margin, *position))
+
+    far = (400, 500)  # the reference ends nowhere near: the smaller view decides
+    half = (small.shape[axis] - 1) / 2 - 3.0
+    for side in (-1, 1):
+        for beyond, expected in ((0.0, True), (1e-6, False), (-1e-6, True)):
+            at = middle[axis] + side * (half + beyond)
+            assert inside([large, small], far, 3.0, at) == expected
+    near = (30, 50)  # and here the reference does: its outermost pixels belong to it
+    half = (near[axis] - 1) / 2 / 2.0
+    for side in (-1, 1):
+        for beyond, expected in ((-1e-9, True), (1e-6, False)):
+            assert inside([large], near, 0.0, middle[axis] + side * (half + beyond)) == expected
+
+
+@pytest.mark.parametrize(
+    ("assumed", "spread", "expected"),
+    [(None, 0.0, None), (None, 0.2, 0.7), (0.5, 0.0, 0.5), (0.5, 0.2, 0.5)],
+)
+def test_a_blur_is_assumed_where_it_is_given_or_spreads(assumed, spread, expected):
+    assert assumed_blur({"blur": 0.7, "blur_spread": spread, "assumed_blur": assumed}) == expected
+
+
+@pytest.mark.parametrize(
+    ("guard", "border", "margin"), [(2, 3.0, 3.0), (5, 3.0, 5.0), (3, 3.0, 3.0)]
+)
+def test_the_larger_of_guard_band_and_border_is_left_out(guard, border, margin):
+    views = SimpleNamespace(specs=[ViewSpec(1.1, 2.0, (20, 30))] * 2, reference_shape=(200, 200))
+    asked = ComparedInViews(border, 1.26, 1.9, sigma_min=1.1, n_oct=1, guard=guard)
+    found = common_range(views, asked)
+    at = pd.DataFrame({"view": 0, "y": [margin, margin - 0.01], "x": 15.0, "sigma": 1.6})
+    assert found.margin == margin and len(found.common(at)) == 1
+    assert (found.low, found.high) == pytest.approx((1.1 * 1.26, 1.1 * 1.9))

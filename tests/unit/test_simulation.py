@@ -263,3 +263,32 @@ def test_the_largest_lengths_still_give_numbers():
     for blur, step, rotation in ((0.0, 1e14, 0.0), (0.0, 1e14, 0.3), (1e3, 1e12, 0.3)):
         view = simulate_view(picture((8, 8)), blur, step, (4, 4), rotation=rotation)
         assert np.isfinite(view).all()
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.sampled_from([(9, 14), (14, 9)]), st.floats(0.5, 2.5), st.floats(0.3, 1.5),
+    st.tuples(st.floats(-3, 3), st.floats(-3, 3)),
+    st.sampled_from([0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 0.3]),
+)  # fmt: skip
+def test_the_view_of_a_transposed_scene_is_transposed(shape, step, blur, shift, quarters):
+    scene = np.random.default_rng(3).random((19, 30))
+    turn = quarters * math.pi / 2
+    view = simulate(scene, ViewSpec(blur, step, shape, shift, turn))
+    other = simulate(scene.T, ViewSpec(blur, step, shape[::-1], shift[::-1], -turn))
+    assert view.shape == shape
+    np.testing.assert_allclose(other.T, view, atol=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.floats(0.5, 2.5), st.tuples(st.floats(-3, 3), st.floats(-3, 3)), st.floats(-3, 3),
+    st.floats(0, 12), st.floats(0, 12),
+)  # fmt: skip
+def test_positions_in_a_transposed_scene_are_transposed(step, shift, turn, y, x):
+    spec = ViewSpec(0.8, step, (9, 14), shift, turn)
+    other = ViewSpec(0.8, step, (14, 9), shift[::-1], -turn)
+    assert to_reference(other, (30, 19), x, y)[::-1] == pytest.approx(
+        to_reference(spec, (19, 30), y, x)
+    )
+    assert to_view(other, (30, 19), x, y)[::-1] == pytest.approx(to_view(spec, (19, 30), y, x))

@@ -68,6 +68,18 @@ def test_tiling_does_not_show(tmp_path, tile):
     )
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("tile", "side"), [(32, 32), (60, 60), (128, 70)])
+def test_tiles_are_no_larger_than_the_longer_side(tmp_path, tile, side, turned):
+    class Oblong(Space):
+        shape = (3, 50, 70) if turned else Space.shape
+        y, x = (Space.x, Space.y) if turned else (Space.y, Space.x)
+
+    scale_space_store.write_scale_space(Oblong(), tmp_path, tile=tile)
+    chunks = scale_space_store.open_scale_space(tmp_path)["dog"].encoding["chunks"]
+    assert tuple(chunks) == (3, side, side)
+
+
 def test_windows_are_read_lazily_and_exactly(store):
     space = scale_space_store.StoredScaleSpace(store)
     box = (slice(1, 3), slice(30, 66), slice(40, 50))
@@ -316,3 +328,22 @@ def test_damaged_and_missing_views_are_found(tmp_path):
     chunk.unlink()
     with pytest.raises(InputError, match="image/c/1/0/0 is missing"):
         view_store.open_views(tmp_path)
+
+
+def test_a_store_that_lacks_a_part_is_named_by_that_part_alone(store):
+    shutil.rmtree(store / "data.zarr/sigma")
+    with pytest.raises(InputError) as raised:
+        scale_space_store.open_scale_space(store)
+    said = f"{store / 'data.zarr/sigma'} is missing; delete the store and make it again"
+    assert str(raised.value) == said
+
+
+def test_views_are_stored_in_the_types_that_are_named(tmp_path):
+    spec = ViewSpec(1.1, 2.0, (4, 6))
+    for dtype in ("float16", "int32", "f4"):
+        with pytest.raises(InputError, match=f"not as {dtype}"):
+            view_store.write_views([np.zeros((4, 6))], [spec], tmp_path / "a", {}, dtype)
+    about = {"set": "a", "reference_blur": 0.0, "reference_shape": [40, 60]}
+    for dtype in ("float32", "float64"):
+        view_store.write_views([np.zeros((4, 6))], [spec], tmp_path / dtype, about, dtype)
+        assert view_store.Views(tmp_path / dtype).reference_shape == (40, 60)

@@ -5,13 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import scenes
 
 from keystab.io.pictures import write_picture
 from keystab.io.tables import read_table
-from keystab.io.view_store import read_view
-from keystab.stages import crop_views, detect_views, match_sweep, noise_theory, simulate
+from keystab.io.view_store import read_view, read_views
+from keystab.stages import (
+    crop_views,
+    describe_views,
+    detect_views,
+    match_sweep,
+    match_views,
+    noise_theory,
+    simulate,
+)
 
 KAPPA = "1.2599210498948732"
 NOISES = (0.0, 0.02)
@@ -152,3 +161,63 @@ def test_theory_covers_all_octaves(tmp_path):
     octave = theory.set_index(theory["sigma"].round(9))["dog_noise"]
     ratio = octave[1.1] / octave[2.2]
     assert theory["octave_ratio"].iloc[0] == pytest.approx(ratio)
+
+
+def test_views_are_described_by_their_own_pixels(sets, tmp_path):
+    # Oblong views: height and width, and the axes of the pixels, cannot stand for each other.
+    folder = sets[1]
+    out = (tmp_path / "views.csv", tmp_path / "pixels.parquet")
+    stored = ["--views", str(folder / "views"), "--views-digest", str(folder / "views.sha256")]
+    assert describe_views.main([*stored, "--table", str(out[0]), "--pixels", str(out[1])]) == 0
+    table, pixels = map(read_table, out)
+    assert table["view"].tolist() == list(range(N_VIEWS))
+    assert table["label"].tolist() == ["c = 0.8, S = 2"] * N_VIEWS
+    for row in table.itertuples():
+        image = read_views(folder / "views", folder / "views.sha256")[row.view].image
+        own = pixels[pixels["view"] == row.view]
+        assert (row.height, row.width) == image.shape and row.height < row.width
+        assert (row.blur, row.step, len(own)) == (0.8, 2.0, image.size)
+        assert (own["value"].to_numpy() == image[own["y"], own["x"]]).all()
+        assert (row.mean, row.standard_deviation) == pytest.approx((image.mean(), image.std()))
+
+
+def test_samplings_of_one_set_are_matched_with_curves_and_precision_where_they_are_asked_for(
+    sets, tmp_path
+):
+    # Three times the same view: all is seen always, at the same place. Two samplings by name.
+    member = sets[0]
+    out = {
+        name: tmp_path / f"{name}.csv" for name in ("curves", "precision", "counts", "differences")
+    }
+    words = {
+        "views": [member / "views"], "views-digest": [member / "views.sha256"],
+        "extrema": [member / "extrema.parquet"] * 2, "traces": [member / "traces.parquet"] * 2,
+        "n-spo": [4, 6], "curve-n-spo": [4], "max-offsets": [0.6, 0.9], "iterations": [2, 5],
+        "sigma-min": [1.1], "n-oct": [2], "guard": [0], "border": [3.0], "first-scale": [KAPPA],
+        "last-scale": [None], "space-tolerance": [1.0], "scale-ratio": [2**0.5],
+        "match-sign": [False], "max-offset": [0.6], "max-iterations": [2],
+        "minimum-share": [0.5], "n-resamples": [20],
+        **{name: [path] for name, path in out.items()},
+    }  # fmt: skip
+    asked = [text for name, values in words.items() for text in (f"--{name}", *map(str, values))]
+    assert match_views.main(asked) == 0
+    curves, precision, counts, differences = (read_table(path) for path in out.values())
+
+    def of(table):
+        rows = table[["n_spo", "detections", "max_offset", "max_iterations"]].drop_duplicates()
+        return {
+            tuple(None if pd.isna(it) else it for it in row) for row in rows.to_numpy().tolist()
+        }
+
+    discrete, usual = ("discrete", None, None), ("refined", 0.6, 2.0)
+    further = {("refined", 0.9, 2.0), ("refined", 0.6, 5.0), ("refined", 0.9, 5.0)}
+    assert of(curves) == {(4, *it) for it in {discrete, usual, *further}}
+    assert of(counts) == of(curves) | {(6, *discrete), (6, *usual)}
+    assert of(precision) == {(n, *it) for n in (4, 6) for it in (discrete, usual)}
+    assert (counts["share_always"] == 1).all() and (counts["n_views"] == N_VIEWS).all()
+    assert (curves["percentage_of_unique"] == 100).all()
+    # Looser limits lose fewer keypoints.
+    n = counts[counts["n_spo"] == 4].set_index(["max_offset", "max_iterations"])["n_unique"]
+    assert n[0.9, 5] >= n[0.9, 2] >= n[0.6, 2] and n[0.9, 5] >= n[0.6, 5] >= n[0.6, 2]
+    assert n[0.9, 5] > n[0.6, 2]
+    assert len(differences) > 0

@@ -18,6 +18,7 @@ NAMES = [
     "changes",
     "findings",
     "interrupted",
+    "mutations",
     "overheads",
     "reference_pages",
     "report",

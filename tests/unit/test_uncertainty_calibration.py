@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from keystab.experiments.uncertainty_calibration import (
     METHODS,
+    counterparts,
     coverage_table,
     judged,
     noise_argument,
@@ -138,3 +143,47 @@ def test_shots_have_the_noise_that_is_said_and_differ_by_their_purpose():
     assert packed.std() == pytest.approx(0.02, rel=0.1)
     assert np.abs(packed - shot(0.5 * view, "jpeg", 0.0, 1)).max() > 0.02
     assert np.rint(255 * packed) == pytest.approx(255 * packed)
+
+
+def test_a_counterpart_lies_nearer_than_the_radius_in_scale_rows_and_columns():
+    first = pd.DataFrame({"y": [20.0], "x": [30.0], "sigma": [2.0], "sign": [1]})
+    for name in ("y", "x", "sigma"):
+        for inside in (True, False):
+            second = first.copy()
+            far = 0.999 if inside else 1.001
+            if name == "sigma":
+                second["sigma"] *= math.exp(far * 0.5)
+            else:
+                second[name] += far * 0.5 * 2.0
+            assert (counterparts(first, second, radius=0.5).tolist() == [0]) == inside, name
+    # Exactly on the radius is not nearer: 0.5 times 2 pixels.
+    assert counterparts(first, first.assign(y=21.0), radius=0.5).tolist() == [-1]
+    # Both shifts count together, and neither for the other.
+    both = first.assign(y=20.0 + 0.8, x=30.0 + 0.8)
+    assert counterparts(first, both, radius=0.5).tolist() == [-1]
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10**6), st.booleans())
+def test_counterparts_do_not_depend_on_the_order_of_rows_nor_of_axes(seed, one_to_one):
+    rng = np.random.default_rng(seed)
+    first, second = (
+        pd.DataFrame(
+            {
+                "y": rng.uniform(0, 9, n), "x": rng.uniform(20, 33, n),
+                "sigma": rng.uniform(1, 3, n), "sign": rng.choice([-1, 1], n),
+            }
+        )
+        for n in (12, 15)
+    )  # fmt: skip
+    plain = counterparts(first, second, one_to_one)
+    turned = [it.rename(columns={"y": "x", "x": "y"}) for it in (first, second)]
+    assert (counterparts(*turned, one_to_one) == plain).all()
+    a, b = rng.permutation(12), rng.permutation(15)
+    moved = counterparts(first.iloc[a], second.iloc[b], one_to_one)
+    assert (np.where(moved >= 0, b[moved], -1) == plain[a]).all()
+    negated = [it.assign(sign=-it["sign"]) for it in (first, second)]
+    assert (counterparts(*negated, one_to_one) == plain).all()
+    if one_to_one:
+        kept = plain[plain >= 0]
+        assert len(set(kept.tolist())) == len(kept)

@@ -223,3 +223,24 @@ def test_what_is_no_number_or_has_no_order_gets_one_line():
         unique_keypoints(table, space_tolerance="wide")
     with pytest.raises(InputError, match="scale_ratio is None"):
         occurrence(table, table, scale_ratio=None)
+
+
+@pytest.mark.parametrize("name", ["y", "x", "sigma", "sign"])
+def test_each_coordinate_decides_among_equally_near_detections(name):
+    # They differ in one coordinate alone: the lower one goes first, in any order of rows.
+    unique = pd.DataFrame({"y": [0.0], "x": [0.0], "sigma": [1.0], "sign": [0]})
+    pair = {"y": [0.0, 0.0], "x": [0.0, 0.0], "sigma": [1.0, 1.0], "sign": [1, 1], "set": 0}
+    if name == "sigma":  # both as far away as y says
+        pair |= {"y": [0.5, 0.5], "sigma": [1.01, 1.0]}
+    else:
+        pair[name] = [1, -1]
+    table = pd.DataFrame(pair)
+    assert matches(unique, table).tolist() == [[1]]
+    assert matches(unique, table[::-1]).tolist() == [[0]]
+
+
+def test_a_set_that_is_not_named_is_refused_wherever_its_row_stands():
+    for sets in (["a", "b", "a"], ["b", "a", "a"], ["a", "a", "b"]):
+        table = pd.DataFrame({"y": [0.0, 5.0, 9.0], "x": 0.0, "sigma": 1.1, "set": sets})
+        with pytest.raises(InputError, match="holds 'b', which is none of the sets given"):
+            matches(table, table, sets=["a"])
