@@ -777,3 +777,25 @@ def test_a_scale_on_the_end_of_two_octaves_is_of_the_upper_one(monkeypatch):
     monkeypatch.setattr(measures, "_recalled", lambda seen: (sigma, on_end, None))
     rows = [measures._octave(low, 2 * low, [], pairs) for low in (1.4, 2.8)]
     assert [row["recall"] for row in rows] == pytest.approx([1 / 2, 2 / 3])
+
+
+@pytest.mark.parametrize(
+    ("ratio", "low", "high"), [(1.0, LOW, HIGH), (1.5, 1.5 * LOW, HIGH), (0.5, LOW, 0.5 * HIGH)]
+)
+def test_two_views_are_compared_at_scales_that_both_see(ratio, low, high):
+    scales = np.array([low * 0.999, low, low * 1.001, high * 0.999, high * 1.001])
+    specs = [ViewSpec(BLUR, step, (80, 90)) for step in (STEP, STEP * ratio)]
+    stage = SimpleNamespace(
+        scene=SimpleNamespace(shape=(900, 900)), compared=lambda spec, y, x: np.ones(len(y), bool)
+    )
+    seen = []
+    for spec, factor in zip(specs, (1.0, ratio), strict=True):
+        found = pd.DataFrame({"y": 40.0, "x": 45.0, "sigma": scales / factor})
+        view = SimpleNamespace(spec=spec, strength=lambda it: np.arange(len(it)))
+        seen.append(SimpleNamespace(found=found, view=view))
+    # As given, where the ends are not met to the last digit.
+    inside = scales[2:4] if ratio != 1.0 else scales[1:4]
+    for table in measures._in_first_frame(SimpleNamespace(stage=stage), *seen):
+        kept = table["sigma"].to_numpy()
+        assert set(np.round(inside, 9)) <= set(np.round(kept, 9))
+        assert (kept >= low * (1 - 1e-9)).all() and (kept <= high * (1 + 1e-9)).all()

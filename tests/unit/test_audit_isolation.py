@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -215,3 +216,9 @@ def test_a_picture_has_as_many_keypoints_as_pixels_and_no_more(tmp_path):
         found, seconds, said = isolation._checked(tmp_path / "found.npz", (2, 3))
         assert (found is None, seconds) == (n == 7, 0.5)
         assert ("more than the picture has pixels" in said) == (n == 7)
+
+
+def test_seconds_are_those_that_a_detector_took(here):
+    since = time.monotonic()
+    (found,) = detections(own_detector("mine:slow"), [IMAGE], [0.5], Limits())
+    assert found.problem == "" and 0.5 <= found.seconds < time.monotonic() - since
