@@ -442,7 +442,7 @@ def test_the_summary_counts_what_the_table_holds(tmp_path):
     assert words["position"].startswith(
         "half have a standard deviation below 0.35 px, nine tenths below 0.54"
     )
-    assert words["scale"] == "half below 10.0%"
+    assert words["scale"] == "half have one below 10.0%"
     assert words["survival"] == "25% above 0.9, 25% below 0.5"
     assert words["noise"] == "0.01, estimated from the picture"
     given = library._summary(Namespace(noise=0.01, output=None, draw=None), found)
