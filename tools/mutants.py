@@ -266,17 +266,22 @@ def noticed(
         found = _until_noticed(row, costly, failing, loops, all_)
     finally:
         shutil.copy2(original, path)
-    _require_sound(found["by"])
-    return found
+    if _is_sound(found["by"]):
+        return found
+    print(found["by"], "fails on unchanged code at times: the change is made again without it")
+    failing.append(found["by"])
+    return noticed(row, costly, failing, all_)
 
 
-def _require_sound(test: str) -> None:
-    """Stop where a test that noticed something fails on unchanged code too."""
+def _is_sound(test: str) -> bool:
+    """Whether a test that noticed something passes on unchanged code."""
     sound = SOUND.read_text().splitlines() if SOUND.is_file() else []
-    if "::" in test and test not in sound:
-        if pytest([test], LOOPS, 600.0)[0]:
-            raise SystemExit(f"error: {test} fails on unchanged code; mend it and go on")
-        SOUND.write_text("\n".join([*sound, test]))
+    if "::" not in test or test in sound:
+        return True
+    if pytest([test], LOOPS, 600.0)[0]:
+        return False
+    SOUND.write_text("\n".join([*sound, test]))
+    return True
 
 
 def _until_noticed(
