@@ -4,7 +4,7 @@ python tools/mutants.py draw            draw the sample anew: only where other c
 python tools/mutants.py run             make each change in a copy, run the tests of its module
 python tools/mutants.py run --all       and of what survived all the others that are not slow
 python tools/mutants.py run 17 230      only these, again
-python tools/mutants.py table           write the result, with the commit it is of
+python tools/mutants.py table           write the result, with the commits it is of
 
 A run goes on where the last one was stopped. Its copy, its costs and its results lie in
 ``build/mutants``; the sample, the equivalent ones with the reason, and the last result in
@@ -266,17 +266,22 @@ def noticed(
         found = _until_noticed(row, costly, failing, loops, all_)
     finally:
         shutil.copy2(original, path)
-    _require_sound(found["by"])
-    return found
+    if _is_sound(found["by"]):
+        return found
+    print(found["by"], "fails on unchanged code at times: the change is made again without it")
+    failing.append(found["by"])
+    return noticed(row, costly, failing, all_)
 
 
-def _require_sound(test: str) -> None:
-    """Stop where a test that noticed something fails on unchanged code too."""
+def _is_sound(test: str) -> bool:
+    """Whether a test that noticed something passes on unchanged code."""
     sound = SOUND.read_text().splitlines() if SOUND.is_file() else []
-    if "::" in test and test not in sound:
-        if pytest([test], LOOPS, 600.0)[0]:
-            raise SystemExit(f"error: {test} fails on unchanged code; mend it and go on")
-        SOUND.write_text("\n".join([*sound, test]))
+    if "::" not in test or test in sound:
+        return True
+    if pytest([test], LOOPS, 600.0)[0]:
+        return False
+    SOUND.write_text("\n".join([*sound, test]))
+    return True
 
 
 def _until_noticed(
@@ -337,16 +342,34 @@ def run(numbers: Sequence[int], all_: bool) -> None:
     costly, failing = costs()
     sample = read(KEPT / "sample.csv")
     random.Random(SEED).shuffle(sample)  # a part of it is a sample of all rooms too
-    results = {row["number"]: row for row in read(WORK / "results.csv")}
+    results = {
+        row["number"]: row | {"commit": row.get("commit", "")} for row in read(WORK / "results.csv")
+    }
+    commit = _commit()  # of the copy: what is edited meanwhile is not in it
     for row in sample:
         old = results.get(row["number"])
         again = old is None or (all_ and not old["by"] and old["of"] != "all")
         if int(row["number"]) in numbers if numbers else again:
             found = {"number": row["number"], **noticed(row, costly, failing, all_)}
+            found["commit"] = commit
             results[row["number"]] = found
             write(WORK / "results.csv", sorted(results.values(), key=lambda it: int(it["number"])))
             print(row["number"], row["module"], row["line"], row["before"], "->", row["after"], ":",
                   found["by"] or "NOT NOTICED", found["seconds"], flush=True)  # fmt: skip
+
+
+_UNFINISHED = [
+    "This is no finished measurement: changes are not all made yet, or not all with the tests of "
+    "one commit. What survived at first had tests written for it and was made again, so that the "
+    "shares are higher than those of changes that nobody has looked at.",
+    "",
+]
+
+
+def _commit() -> str:
+    """The commit here, and whether files differ from it."""
+    said = ["git", "describe", "--always", "--dirty", "--exclude=*"]
+    return subprocess.run(said, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
 
 def table() -> str:
@@ -355,19 +378,14 @@ def table() -> str:
     equal = {row["number"]: row["reason"] for row in read(KEPT / "equivalent.csv")}
     results = [sample[it["number"]] | it for it in read(WORK / "results.csv") if it["by"] != "gone"]
     counted = [it for it in results if it["by"] or it["number"] not in equal]
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.strip()
+    commits = sorted({it.get("commit") or "a commit that was not noted" for it in results})
     seconds = [float(it["seconds"]) for it in counted if it["by"]]
     lines = [
         "# Which wrong lines the tests notice", "",
-        f"Of commit `{commit}`, by `make mutants`: {len(results)} of the {len(sample)} changes of "
-        f"`sample.csv` were made, {len(results) - len(counted)} of them change nothing "
+        f"By `make mutants`, of {', '.join(commits)}: {len(results)} of the {len(sample)} changes "
+        f"of `sample.csv` were made, {len(results) - len(counted)} of them change nothing "
         f"(`equivalent.csv`). Median time to notice: {statistics.median(seconds):.1f} s.", "",
+        *_UNFINISHED * (len(results) < len(sample) or len(commits) > 1),
         "| what | noticed | of | share |", "|---|--:|--:|--:|",
     ]  # fmt: skip
     parts = {"all": counted}
